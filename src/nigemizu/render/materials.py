@@ -1,0 +1,117 @@
+"""Surface materials that a scene can name. Colours are linear reflectances (red, green, blue), 0 to 1."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, final
+
+from pydantic import Field
+
+from nigemizu.render.light import Reflectance
+from nigemizu.values import Value
+
+__all__ = ["Asphalt", "Checker", "Colour", "Masonry", "Material", "Sand", "Texture"]
+
+Length = Annotated[float, Field(gt=0)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+
+
+@final
+class Colour(Value):
+    """One matt colour."""
+
+    kind: Literal["colour"] = "colour"
+    colour: Reflectance = (0.5, 0.5, 0.5)
+
+
+@final
+class Texture(Value):
+    """An image, laid over the surface's own (u, v) coordinates.
+
+    Parameters
+    ----------
+    image : str
+        Path of a PNG, JPEG or EXR file.
+    repeat : (u, v)
+        How often the image is repeated across the surface.
+    """
+
+    kind: Literal["texture"] = "texture"
+    image: str
+    repeat: tuple[Length, Length] = (1.0, 1.0)
+
+
+@final
+class Sand(Value):
+    """Matt ground with natural unevenness of brightness at all scales that the picture resolves.
+
+    Parameters
+    ----------
+    colour : (r, g, b)
+        Mean reflectance.
+    contrast : float
+        Relative strength of the unevenness (0 = even).
+    scale : float, m
+        Length of the coarsest patches; finer ones follow down to a decimetre.
+    seed : int
+        Seed of the pattern.
+    """
+
+    kind: Literal["sand"] = "sand"
+    colour: Reflectance = (0.52, 0.40, 0.27)
+    contrast: Fraction = 0.25
+    scale: Length = 120.0
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+@final
+class Asphalt(Value):
+    """Dark, finely grained road surface."""
+
+    kind: Literal["asphalt"] = "asphalt"
+    colour: Reflectance = (0.085, 0.085, 0.09)
+    contrast: Fraction = 0.2
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+@final
+class Checker(Value):
+    """A chessboard of two colours in horizontal coordinates, for seeing shapes and distances.
+
+    Parameters
+    ----------
+    colours : two (r, g, b)
+        Reflectance of the two kinds of field.
+    size : float, m
+        Side of one field.
+    """
+
+    kind: Literal["checker"] = "checker"
+    colours: tuple[Reflectance, Reflectance] = ((0.15, 0.15, 0.15), (0.7, 0.7, 0.7))
+    size: Length = 10.0
+
+
+@final
+class Masonry(Value):
+    """Courses of cut stone: each course and each stone a little different, with darker joints.
+
+    Parameters
+    ----------
+    colour : (r, g, b)
+        Mean reflectance of the stone.
+    course : float, m
+        Height of one course.
+    contrast : float
+        Relative strength of the differences from stone to stone.
+    seed : int
+        Seed of the pattern.
+    """
+
+    kind: Literal["masonry"] = "masonry"
+    colour: Reflectance = (0.50, 0.38, 0.25)
+    course: Length = 1.0
+    contrast: Fraction = 0.35
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+Material = Annotated[Colour | Texture | Sand | Asphalt | Checker | Masonry, Field(discriminator="kind")]
+"""Any material, told apart by its ``kind``."""
