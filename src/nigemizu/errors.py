@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["InputError", "MachineError", "NigemizuError"]
+__all__ = ["InputError", "MachineError", "NigemizuError", "NigemizuWarning"]
 
 
 class NigemizuError(Exception):
@@ -62,6 +62,13 @@ class InputError(NigemizuError):
 
 class MachineError(NigemizuError):
     """The machine lacks something that the work needs (LLVM, disk space, memory)."""
+
+
+class NigemizuWarning(UserWarning):
+    """Something a person should know about a result that could still be computed.
+
+    Its text is one line. The command line prints it on stderr.
+    """
 
 
 def _short(value: object, limit: int = 80) -> str:
