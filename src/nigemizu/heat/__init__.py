@@ -1,0 +1,101 @@
+"""Heat in the air: the grid, the beginning, the boundaries, and the temperature as it evolves.
+
+The names are imported when they are first used, so that describing an experiment needs neither the compiler
+of the solver nor the readers of datasets.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from nigemizu.heat.boundary import (
+        ExchangeGround,
+        FluxGround,
+        GroundBoundary,
+        HeldGround,
+        Sides,
+        Top,
+    )
+    from nigemizu.heat.dataset import complete, read_air, refractivity_at, to_dataset
+    from nigemizu.heat.grid import Grid, GridSpec, available_memory, require_memory
+    from nigemizu.heat.initial import Initial, ProfileTable, Unevenness
+    from nigemizu.heat.quantity import (
+        Daily,
+        Disc,
+        Image,
+        Patches,
+        Pattern,
+        Quantity,
+        Rectangle,
+        Schedule,
+        Stripes,
+    )
+    from nigemizu.heat.solver import State, evolve, solve
+    from nigemizu.heat.transport import Diffusivity, Wind
+
+__all__ = [
+    "Daily",
+    "Diffusivity",
+    "Disc",
+    "ExchangeGround",
+    "FluxGround",
+    "Grid",
+    "GridSpec",
+    "GroundBoundary",
+    "HeldGround",
+    "Image",
+    "Initial",
+    "Patches",
+    "Pattern",
+    "ProfileTable",
+    "Quantity",
+    "Rectangle",
+    "Schedule",
+    "Sides",
+    "State",
+    "Stripes",
+    "Top",
+    "Unevenness",
+    "Wind",
+    "available_memory",
+    "complete",
+    "evolve",
+    "read_air",
+    "refractivity_at",
+    "require_memory",
+    "solve",
+    "to_dataset",
+]
+
+_HOMES: Final = {
+    "boundary": ("ExchangeGround", "FluxGround", "GroundBoundary", "HeldGround", "Sides", "Top"),
+    "dataset": ("complete", "read_air", "refractivity_at", "to_dataset"),
+    "solver": ("State", "evolve", "solve"),
+    "grid": ("Grid", "GridSpec", "available_memory", "require_memory"),
+    "initial": ("Initial", "ProfileTable", "Unevenness"),
+    "quantity": (
+        "Daily",
+        "Disc",
+        "Image",
+        "Patches",
+        "Pattern",
+        "Quantity",
+        "Rectangle",
+        "Schedule",
+        "Stripes",
+    ),
+    "transport": ("Diffusivity", "Wind"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"nigemizu.heat.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return list(__all__)
