@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from nigemizu.errors import InputError
+from nigemizu.heat.measures import Metres
 from nigemizu.values import Value
 
 __all__ = ["Grid", "GridSpec", "available_memory", "require_memory"]
@@ -113,7 +114,7 @@ class Grid:
         return step
 
 
-Interval = tuple[float, float]
+Interval = tuple[Metres, Metres]
 Count = Annotated[int, Field(ge=1)]
 
 
@@ -144,9 +145,9 @@ class GridSpec(Value):
 
     x: Interval
     y: Interval
-    height: float = Field(gt=0)
+    height: Metres = Field(gt=0)
     cells: tuple[Count, Count, Count]
-    first_cell: float | None = Field(default=None, gt=0)
+    first_cell: Metres | None = Field(default=None, gt=0)
 
     @model_validator(mode="after")
     def _box_is_not_empty(self) -> Self:
