@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final, Self, final
 
 import numpy as np
@@ -161,7 +162,7 @@ class Initial(Value):
         The same everywhere.
     profile : str or ProfileTable, K
         Function of the height z [m]: a formula such as ``"300 + 20*exp(-z/0.1)"``, or a table.
-    dataset : str
+    dataset : path
         A file with `air_temperature` on axes x, y, z [m] and perhaps time, interpolated linearly to the
         cells; beyond its ends the outermost values continue.
     dataset_time : float, optional, s
@@ -179,7 +180,7 @@ class Initial(Value):
 
     temperature: float | None = Field(default=None, gt=0)
     profile: str | ProfileTable | None = None
-    dataset: str | None = None
+    dataset: Path | None = None
     dataset_time: float | None = None
     unevenness: tuple[Unevenness, ...] = ()
 
@@ -246,7 +247,7 @@ class Initial(Value):
             raise InputError(
                 "the dataset has no temperature at this instant",
                 key="initial.dataset_time",
-                file=self.dataset,
+                file=str(self.dataset),
                 value=self.dataset_time,
             )
         # linear interpolation in three dimensions is linear interpolation along one after the other

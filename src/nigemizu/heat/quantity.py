@@ -205,7 +205,7 @@ class Image(Value):
 
     Parameters
     ----------
-    file : str
+    file : path
         Any picture that Pillow reads; colours become luminance.
     values, offsets : (float, float)
         One of the two: numbers for black and white that replace the quantity, or that are added to it.
@@ -214,7 +214,7 @@ class Image(Value):
     """
 
     kind: Literal["image"] = "image"
-    file: str
+    file: Path
     values: tuple[float, float] | None = None
     offsets: tuple[float, float] | None = None
     x: Interval | None = None
@@ -337,21 +337,21 @@ class Quantity(Value):
         return low, high
 
 
-def _read_grey(file: str) -> np.ndarray:
+def _read_grey(file: Path) -> np.ndarray:
     """Luminance of a picture, (rows, columns) float64 in 0..1, first row at the top."""
     from PIL import Image as Pictures
     from PIL import UnidentifiedImageError
 
-    path = Path(file).expanduser()
+    path = file.expanduser()
     try:
         with Pictures.open(path) as picture:
             deep = picture.mode.startswith("I") or picture.mode == "F"
             grey = np.asarray(picture if deep else picture.convert("L"), dtype=np.float64)
             return grey / (65535.0 if picture.mode.startswith("I") else 1.0 if picture.mode == "F" else 255.0)
     except FileNotFoundError:
-        raise InputError("no such picture", key="pattern.file", value=file) from None
+        raise InputError("no such picture", key="pattern.file", value=str(file)) from None
     except (UnidentifiedImageError, OSError) as error:
-        raise InputError(f"cannot read the picture: {error}", key="pattern.file", value=file) from None
+        raise InputError(f"cannot read the picture: {error}", key="pattern.file", value=str(file)) from None
 
 
 def _ends(centres: np.ndarray) -> Interval:
