@@ -1,0 +1,129 @@
+"""Array types of a compute backend, and the check that the backend can be used at all."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, final
+
+import drjit as dr
+
+from nigemizu.errors import InputError, MachineError
+
+__all__ = ["Backend", "Precision", "Types", "types"]
+
+Backend: TypeAlias = Literal["llvm", "cuda"]
+Precision: TypeAlias = Literal["single", "double"]
+
+OLDEST_LLVM = 16  # older ones abort the whole process on machines with AVX-512
+
+_LLVM_REMEDY = "install it (Debian, Ubuntu: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH"
+
+
+@final
+@dataclass(frozen=True)
+class Types:
+    """The Dr.Jit array types of one backend and precision.
+
+    Attributes
+    ----------
+    backend : {"llvm", "cuda"}
+    precision : {"single", "double"}
+        Precision of positions, directions and everything computed from them.
+    differentiable : bool
+        Whether the types can carry derivatives (Mitsuba's ``*_ad_*`` variants use such types).
+    Float, UInt32, Int32, Bool, Array3f : type
+        Arrays over the rays; ``Array3f`` holds three ``Float``.
+    Float32, Float64 : type
+        Single and double arrays whatever the precision, for stored data.
+    """
+
+    backend: Backend
+    precision: Precision
+    differentiable: bool
+    Float: Any
+    UInt32: Any
+    Int32: Any
+    Bool: Any
+    Array3f: Any
+    Float32: Any
+    Float64: Any
+
+    def storage(self, precision: Precision) -> Any:
+        """Array type that stores data in `precision`."""
+        return self.Float32 if precision == "single" else self.Float64
+
+
+def types(
+    backend: Backend = "llvm",
+    precision: Precision = "single",
+    differentiable: bool = False,
+    *,
+    llvm_version: Callable[[], tuple[int, ...] | None] | None = None,
+) -> Types:
+    """Array types of a backend.
+
+    Parameters
+    ----------
+    backend : {"llvm", "cuda"}
+        Processor (through LLVM) or NVIDIA graphics card.
+    precision : {"single", "double"}
+        Single for pictures, double for science.
+    differentiable : bool
+        Take the types that can carry derivatives. Mitsuba's ``llvm_ad_rgb`` works with
+        ``types("llvm", "single", differentiable=True)``.
+    llvm_version : callable, optional
+        Source of the LLVM version (major, minor, patch), None where there is no LLVM;
+        by default Dr.Jit is asked.
+
+    Returns
+    -------
+    Types
+
+    Raises
+    ------
+    MachineError
+        When the backend is missing, or LLVM is older than 16.
+    InputError
+        When the backend or the precision has another name.
+    """
+    if backend not in ("llvm", "cuda"):
+        raise InputError("no such backend", key="backend", value=backend, expected="llvm or cuda")
+    if precision not in ("single", "double"):
+        raise InputError("no such precision", key="precision", value=precision, expected="single or double")
+    if backend == "llvm":
+        _check_llvm(llvm_version or _dr_jit_llvm_version)
+    elif not dr.has_backend(dr.JitBackend.CUDA):
+        raise MachineError("no usable NVIDIA graphics card and driver; use the llvm backend")
+    module = importlib.import_module(f"drjit.{backend}.ad" if differentiable else f"drjit.{backend}")
+    single = precision == "single"
+    return Types(
+        backend=backend,
+        precision=precision,
+        differentiable=differentiable,
+        Float=module.Float if single else module.Float64,
+        UInt32=module.UInt32,
+        Int32=module.Int32,
+        Bool=module.Bool,
+        Array3f=module.Array3f if single else module.Array3f64,
+        Float32=module.Float,
+        Float64=module.Float64,
+    )
+
+
+def _dr_jit_llvm_version() -> tuple[int, ...] | None:
+    # has_backend only loads the library; nothing is compiled before the version has been checked.
+    if not dr.has_backend(dr.JitBackend.LLVM):
+        return None
+    version: tuple[int, ...] = dr.detail.llvm_version()
+    return version
+
+
+def _check_llvm(llvm_version: Callable[[], tuple[int, ...] | None]) -> None:
+    version = llvm_version()
+    if version is None:
+        raise MachineError(f"LLVM ≥ {OLDEST_LLVM} was not found; {_LLVM_REMEDY}")
+    if version[0] < OLDEST_LLVM:
+        found = ".".join(str(part) for part in version)
+        raise MachineError(f"LLVM {found} is too old (≥ {OLDEST_LLVM} is needed); {_LLVM_REMEDY}")

@@ -1,0 +1,102 @@
+"""How a ray ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, final
+
+import drjit as dr
+
+__all__ = ["RayEnd", "RayStatus"]
+
+
+@final
+class RayStatus(IntEnum):
+    """Why a ray ended. `message` says it in words, with the remedy where there is one."""
+
+    NOT_TRACED = 0
+    HIT = 1
+    ESCAPED = 2
+    OUT_OF_STEPS = 3
+    STOPPED = 4
+
+    @property
+    def label(self) -> str:
+        """Name as it stands in reports: ``hit``, ``escaped``, ``out-of-steps``, …"""
+        return self.name.lower().replace("_", "-")
+
+    @property
+    def message(self) -> str:
+        """What happened to the ray."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    RayStatus.NOT_TRACED: "the ray was masked out",
+    RayStatus.HIT: "the ray met a surface",
+    RayStatus.ESCAPED: "the ray left the air volume and met nothing beyond",
+    RayStatus.OUT_OF_STEPS: "the ray used up its steps; raise max_steps or the step",
+    RayStatus.STOPPED: "the ray went the whole distance that was asked for",
+}
+
+
+@final
+@dataclass
+class RayEnd:
+    """Where and how rays ended. One entry per ray, in the field's array types.
+
+    Attributes
+    ----------
+    status : UInt32
+        A `RayStatus`.
+    position : Array3f, m
+        HIT: the point on the surface. ESCAPED: where the ray left the volume (its origin, if it never met
+        the volume). Otherwise where it stopped.
+    direction : Array3f, 1
+        Unit direction of travel there.
+    chord_origin, chord_direction : Array3f, m and 1
+        The last straight piece that was tested against the surface: a hit lies on it, so that a full
+        intersection of this one piece finds it again.
+    chord_length : Float, m
+        Its length; infinite beyond the volume.
+    steps : UInt32
+        Integration steps made (layers: boundaries met).
+    path_length : Float, m
+        Length of the path from the origin to `position`.
+    optical_path : Float or None, m
+        ∫ n ds along it. None unless details were asked for.
+    turning_height : Float or None, m
+        Least height at which the ray turned from falling to rising; NaN where it never did. None unless
+        details were asked for.
+    """
+
+    status: Any
+    position: Any
+    direction: Any
+    chord_origin: Any
+    chord_direction: Any
+    chord_length: Any
+    steps: Any
+    path_length: Any
+    optical_path: Any = None
+    turning_height: Any = None
+
+    @property
+    def hit(self) -> Any:
+        """Whether the ray met a surface (Bool)."""
+        return self.status == int(RayStatus.HIT)
+
+    @property
+    def escaped(self) -> Any:
+        """Whether the ray left the volume and met nothing (Bool)."""
+        return self.status == int(RayStatus.ESCAPED)
+
+
+def choose_status(types: Any, active: Any, hit: Any, escaped: Any, stopped: Any) -> Any:
+    """The status array (UInt32) from masks; what is in none of them has run out of steps."""
+    UInt32 = types.UInt32
+    status = dr.select(stopped, UInt32(int(RayStatus.STOPPED)), UInt32(int(RayStatus.OUT_OF_STEPS)))
+    status = dr.select(escaped, UInt32(int(RayStatus.ESCAPED)), status)
+    status = dr.select(hit, UInt32(int(RayStatus.HIT)), status)
+    return dr.select(active, status, UInt32(int(RayStatus.NOT_TRACED)))
