@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self, final
 
 from pydantic import Field, model_validator
 
+from nigemizu.heat.measures import Kelvin
 from nigemizu.heat.quantity import Quantity
 from nigemizu.values import Value
 
@@ -31,7 +32,7 @@ class HeldGround(Value):
     """
 
     kind: Literal["held"] = "held"
-    temperature: Quantity
+    temperature: Quantity = Field(json_schema_extra={"unit": "K"})
 
     @model_validator(mode="after")
     def _kelvin(self) -> Self:
@@ -64,7 +65,7 @@ class FluxGround(_HeatPerVolume):
     """
 
     kind: Literal["flux"] = "flux"
-    heat_flux: Quantity
+    heat_flux: Quantity = Field(json_schema_extra={"unit": "W/m2"})
 
 
 @final
@@ -84,8 +85,8 @@ class ExchangeGround(_HeatPerVolume):
     """
 
     kind: Literal["exchange"] = "exchange"
-    coefficient: float = Field(gt=0)
-    temperature: Quantity
+    coefficient: float = Field(gt=0, json_schema_extra={"unit": "W/m2/K"})
+    temperature: Quantity = Field(json_schema_extra={"unit": "K"})
 
     @model_validator(mode="after")
     def _kelvin(self) -> Self:
@@ -122,7 +123,7 @@ class Top(Value):
     """
 
     kind: Literal["held", "insulated"] = "held"
-    temperature: float | None = Field(default=None, gt=0)
+    temperature: Kelvin | None = Field(default=None, gt=0)
 
     @model_validator(mode="after")
     def _insulated_has_none(self) -> Self:

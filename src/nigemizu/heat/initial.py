@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from nigemizu.errors import InputError
 from nigemizu.heat.formula import check_formula, evaluate_formula
 from nigemizu.heat.grid import Grid, available_memory, require_memory
+from nigemizu.heat.measures import Kelvin, KelvinDifference, Metres, Seconds
 from nigemizu.values import Value
 
 __all__ = ["Initial", "ProfileTable", "Unevenness"]
@@ -49,10 +50,10 @@ class Unevenness(Value):
     Limits: eddies of real air have a power-law spectrum down to millimetres; this has one scale.
     """
 
-    amplitude: float = Field(gt=0)
-    length: tuple[float, float, float]
+    amplitude: KelvinDifference = Field(gt=0)
+    length: tuple[Metres, Metres, Metres]
     seed: int = Field(default=0, ge=0)
-    depth: float | None = Field(default=None, gt=0)
+    depth: Metres | None = Field(default=None, gt=0)
 
     @model_validator(mode="after")
     def _lengths(self) -> Self:
@@ -136,8 +137,8 @@ class Unevenness(Value):
 class ProfileTable(Value):
     """Temperatures [K] at increasing heights [m]; linear between, constant beyond."""
 
-    heights: tuple[float, ...] = Field(min_length=2)
-    temperatures: tuple[float, ...] = Field(min_length=2)
+    heights: tuple[Metres, ...] = Field(min_length=2)
+    temperatures: tuple[Kelvin, ...] = Field(min_length=2)
 
     @model_validator(mode="after")
     def _rows(self) -> Self:
@@ -178,10 +179,10 @@ class Initial(Value):
     [299.9, 299.7, 299.5, 299.3, 299.1]
     """
 
-    temperature: float | None = Field(default=None, gt=0)
+    temperature: Kelvin | None = Field(default=None, gt=0)
     profile: str | ProfileTable | None = None
     dataset: Path | None = None
-    dataset_time: float | None = None
+    dataset_time: Seconds | None = None
     unevenness: tuple[Unevenness, ...] = ()
 
     @model_validator(mode="after")

@@ -14,11 +14,12 @@ from pydantic_core import CoreSchema
 
 from nigemizu.errors import InputError
 from nigemizu.heat.grid import Grid
+from nigemizu.heat.measures import Degrees, Metres, Seconds
 from nigemizu.values import Value
 
 __all__ = ["Daily", "Disc", "Image", "Patches", "Pattern", "Quantity", "Rectangle", "Schedule", "Stripes"]
 
-Interval = tuple[float, float]
+Interval = tuple[Metres, Metres]
 
 
 @final
@@ -33,7 +34,7 @@ class Schedule(Value):
         In the unit of the quantity.
     """
 
-    times: tuple[float, ...] = Field(min_length=2)
+    times: tuple[Seconds, ...] = Field(min_length=2)
     values: tuple[float, ...] = Field(min_length=2)
 
     @model_validator(mode="after")
@@ -48,7 +49,7 @@ class Schedule(Value):
         """Value at `time` [s]."""
         return float(np.interp(time, self.times, self.values))
 
-    def bounds(self) -> Interval:
+    def bounds(self) -> tuple[float, float]:
         """Lowest and highest value."""
         return min(self.values), max(self.values)
 
@@ -73,8 +74,8 @@ class Daily(Value):
 
     mean: float
     amplitude: float = Field(ge=0)
-    time_of_maximum: float = 50_400.0
-    period: float = Field(default=86_400.0, gt=0)
+    time_of_maximum: Seconds = 50_400.0
+    period: Seconds = Field(default=86_400.0, gt=0)
 
     def at(self, time: float) -> float:
         """Value at `time` [s]."""
@@ -82,7 +83,7 @@ class Daily(Value):
             2 * math.pi * (time - self.time_of_maximum) / self.period
         )
 
-    def bounds(self) -> Interval:
+    def bounds(self) -> tuple[float, float]:
         """Lowest and highest value."""
         return self.mean - self.amplitude, self.mean + self.amplitude
 
@@ -123,8 +124,8 @@ class Disc(_Change):
     """A disc about `center` [m] with `radius` [m] in which the quantity is changed."""
 
     shape: Literal["disc"] = "disc"
-    center: tuple[float, float]
-    radius: float = Field(gt=0)
+    center: tuple[Metres, Metres]
+    radius: Metres = Field(gt=0)
 
     def covers(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """True where the point lies inside."""
@@ -171,9 +172,9 @@ class Stripes(Value):
     """
 
     kind: Literal["stripes"] = "stripes"
-    direction: float = 0.0
-    width: float = Field(gt=0)
-    origin: float = 0.0
+    direction: Degrees = 0.0
+    width: Metres = Field(gt=0)
+    origin: Metres = 0.0
     values: tuple[float, ...] = ()
     offsets: tuple[float, ...] = ()
 
@@ -323,7 +324,7 @@ class Quantity(Value):
         course = self.schedule or self.daily
         return math.inf if course is None else course.finest()
 
-    def bounds(self) -> Interval:
+    def bounds(self) -> tuple[float, float]:
         """Numbers between which the quantity stays, everywhere and always."""
         course = self.schedule or self.daily
         constant = 0.0 if self.value is None else self.value
@@ -354,7 +355,7 @@ def _read_grey(file: Path) -> np.ndarray:
         raise InputError(f"cannot read the picture: {error}", key="pattern.file", value=str(file)) from None
 
 
-def _ends(centres: np.ndarray) -> Interval:
+def _ends(centres: np.ndarray) -> tuple[float, float]:
     # half a cell beyond the outer centres; a single cell counts as one metre wide
     half = 0.5 * (centres[1] - centres[0]) if centres.size > 1 else 0.5
     return float(centres[0] - half), float(centres[-1] + half)

@@ -9,6 +9,7 @@ from typing import Final, Literal, Self, final
 import numpy as np
 from pydantic import Field, model_validator
 
+from nigemizu.heat.measures import Degrees, Metres, MetresPerSecond, SquareMetresPerSecond
 from nigemizu.values import Value
 
 __all__ = ["Diffusivity", "Wind"]
@@ -57,13 +58,13 @@ class Diffusivity(Value):
     """
 
     kind: Literal["molecular", "eddy", "table"] = "molecular"
-    molecular: float = Field(default=2.2e-5, gt=0)
-    friction_velocity: float = Field(default=0.0, ge=0)
-    cap_height: float = Field(default=10.0, gt=0)
-    heights: tuple[float, ...] = ()
-    values: tuple[float, ...] = ()
+    molecular: SquareMetresPerSecond = Field(default=2.2e-5, gt=0)
+    friction_velocity: MetresPerSecond = Field(default=0.0, ge=0)
+    cap_height: Metres = Field(default=10.0, gt=0)
+    heights: tuple[Metres, ...] = ()
+    values: tuple[SquareMetresPerSecond, ...] = ()
     horizontal_factor: float | tuple[float, float] = 1.0
-    horizontal: float | tuple[float, float] | None = None
+    horizontal: SquareMetresPerSecond | tuple[SquareMetresPerSecond, SquareMetresPerSecond] | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -144,14 +145,14 @@ class Wind(Value):
     (0.0, 3.0)
     """
 
-    speed: float = Field(default=0.0, ge=0)
-    direction: float = 0.0
+    speed: MetresPerSecond = Field(default=0.0, ge=0)
+    direction: Degrees = 0.0
     shear: Literal["uniform", "log", "power", "table"] = "uniform"
-    roughness: float = Field(default=0.001, gt=0)
-    reference_height: float = Field(default=2.0, gt=0)
+    roughness: Metres = Field(default=0.001, gt=0)
+    reference_height: Metres = Field(default=2.0, gt=0)
     exponent: float = Field(default=1 / 7, ge=0)
-    heights: tuple[float, ...] = ()
-    speeds: tuple[float, ...] = ()
+    heights: tuple[Metres, ...] = ()
+    speeds: tuple[MetresPerSecond, ...] = ()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
