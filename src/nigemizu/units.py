@@ -38,7 +38,7 @@ _ALIASES: Final[dict[str, str]] = {
 }  # fmt: skip
 # Differences and temperatures share the name "K"; a difference has no offset.
 _DIFFERENCE: Final[dict[str, float]] = {"K": 1.0, "degC": 1.0, "C": 1.0, "°C": 1.0, "degF": 5.0 / 9.0}
-_QUANTITY: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s(*+][^(]*?)?\s*")
+_QUANTITY: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z°%µ][^(*+]*?)?\s*")
 
 
 class UnitError(ValueError):

@@ -57,10 +57,18 @@ class Value(BaseModel):
 
 
 def field_unit(field: FieldInfo) -> str | None:
-    """The unit that a field declares, or None."""
+    """The unit that a field declares, or None; ``Annotated[float, Field(…)] | None`` declares that of its number."""
     extra = field.json_schema_extra
-    unit = extra.get("unit") if isinstance(extra, dict) else None
-    return unit if isinstance(unit, str) else None
+    if isinstance(extra, dict) and isinstance(extra.get("unit"), str):
+        return str(extra["unit"])
+    return _unit_inside(field.annotation)
+
+
+def _unit_inside(annotation: Any) -> str | None:
+    for mark in getattr(annotation, "__metadata__", ()):
+        if isinstance(mark, FieldInfo) and (unit := field_unit(mark)) is not None:
+            return unit
+    return next(filter(None, map(_unit_inside, get_args(annotation))), None)
 
 
 def holds_path(field: FieldInfo) -> bool:

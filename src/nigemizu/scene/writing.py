@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from nigemizu.scene.descriptions import described_fields
 from nigemizu.values import Value, field_unit
 
 __all__ = ["to_toml"]
@@ -37,13 +38,14 @@ def _table(lines: list[str], value: Value, prefix: str, comments: bool) -> None:
     """Keys first, then sub-tables: TOML gives everything after a header to that header."""
     nested: list[tuple[str, Any]] = []
     rows: list[tuple[str, str]] = []
+    meanings = described_fields(type(value)) if comments else {}
     for name, field in type(value).model_fields.items():
         content = getattr(value, name)
         if isinstance(content, Value) or _is_table_list(content):
             nested.append((name, content))
             continue
         unit = field_unit(field)
-        words = [f"[{unit}]" if unit else "", " ".join((field.description or "").split())]
+        words = [f"[{unit}]" if unit else "", meanings.get(name, "")]
         remark = " ".join(filter(None, words))
         if content is not None:
             rows.append((f"{name} = {_literal(content)}", remark))

@@ -1,0 +1,196 @@
+"""The verbs, each a few lines over `nigemizu.scene`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nigemizu.cli.meter import meter
+from nigemizu.errors import InputError
+
+if TYPE_CHECKING:
+    from nigemizu.scene import Scene
+
+__all__ = ["animate", "bench", "check", "doctor", "render", "scenes", "schema", "show", "simulate", "trace"]
+
+# Flags that replace one value of the scene: attribute of the options → key of the scene.
+_FLAG_KEYS = {
+    "samples": "camera.samples",
+    "seed": "camera.seed",
+    "method": "tracer.method",
+    "start": "film.start",
+    "frames": "film.frames",
+    "fps": "film.fps",
+    "every": "time.store_every",
+}
+
+
+def render(options: argparse.Namespace) -> int:
+    """``nigemizu render``."""
+    from nigemizu.output import ready_to_write
+
+    scene = _scene(options)
+    output = ready_to_write(_output(options, ".png"), (".png", ".exr"))
+    _use_threads(options.threads)
+    common = {"time": options.time, "air": options.air, "variant": options.variant}
+    progress = meter(quiet=options.quiet)
+    if options.compare:
+        from nigemizu.scene.comparison import render_comparison
+
+        for written in render_comparison(scene, output, **common, progress=progress):
+            print(written)
+        return 0
+    print(scene.render(**common, progress=progress).save(output))
+    return 0
+
+
+def animate(options: argparse.Namespace) -> int:
+    """``nigemizu animate``."""
+    from nigemizu.output import ready_to_write
+
+    scene = _scene(options)
+    output = ready_to_write(_output(options, ".mp4"), (".mp4",))
+    _use_threads(options.threads)
+    written = scene.animate(
+        output,
+        air=options.air,
+        workers=options.workers,
+        variant=options.variant,
+        progress=meter(quiet=options.quiet),
+    )
+    print(written)
+    return 0
+
+
+def simulate(options: argparse.Namespace) -> int:
+    """``nigemizu simulate``."""
+    from nigemizu.output import ready_to_write, write_air
+
+    scene = _scene(options)
+    output = ready_to_write(_output(options, ".zarr"), (".zarr", ".nc"))
+    _use_threads(options.threads)
+    air = scene.simulate(progress=meter(quiet=options.quiet))
+    print(write_air(air, output))
+    return 0
+
+
+def trace(options: argparse.Namespace) -> int:
+    """``nigemizu trace``."""
+    from nigemizu.output import ready_to_write
+
+    scene = _scene(options)
+    output = None
+    if options.output is not None:
+        output = ready_to_write(Path(options.output), (".csv", ".nc", ".png", ".svg"))
+    elif not options.json:
+        raise InputError("nothing to write", key="trace", remedy="add --json, or -o rays.svg (.png, .csv, .nc)")
+    _use_threads(options.threads)
+    rays = scene.trace(
+        options.elevation,
+        options.azimuth,
+        time=options.time,
+        air=options.air,
+        variant=options.variant,
+        progress=meter(quiet=options.quiet),
+    )
+    if output is not None:
+        written = rays.save(output)
+        print(written, file=sys.stderr if options.json else sys.stdout)
+    if options.json:
+        print(json.dumps(rays.as_records(), indent=1, allow_nan=False))
+    return 0
+
+
+def scenes(options: argparse.Namespace) -> int:
+    """``nigemizu scenes``."""
+    from nigemizu.scene import builtin_scenes
+
+    listed = builtin_scenes()
+    width = max(map(len, listed))
+    for name, title in listed.items():
+        print(f"{name:{width}}  {title}")
+    return 0
+
+
+def show(options: argparse.Namespace) -> int:
+    """``nigemizu show``."""
+    print(_scene(options).to_toml(comments=not options.plain), end="")
+    return 0
+
+
+def check(options: argparse.Namespace) -> int:
+    """``nigemizu check``."""
+    from nigemizu.scene import Scene
+
+    overrides = _overrides(options)
+    for name in options.scene:
+        scene = Scene.load(name, overrides)
+        scene.check()
+        nz, ny, nx = scene.grid.cells[::-1]
+        print(f"{name}: valid ({scene.title or 'untitled'}; {nx}×{ny}×{nz} cells, {len(scene.objects)} objects)")
+    return 0
+
+
+def schema(options: argparse.Namespace) -> int:
+    """``nigemizu schema``."""
+    from nigemizu.scene import Scene
+
+    print(json.dumps(Scene.json_schema(), indent=2, ensure_ascii=False))
+    return 0
+
+
+def doctor(options: argparse.Namespace) -> int:
+    """``nigemizu doctor``."""
+    from nigemizu.cli.doctor import examine, report
+
+    found = examine()
+    print(json.dumps(found, indent=2) if options.json else report(found))
+    return 0 if found["can_render"] else 2
+
+
+def bench(options: argparse.Namespace) -> int:
+    """``nigemizu bench``."""
+    from nigemizu.cli.bench import run_all, table
+
+    results = run_all()
+    print(json.dumps(results, indent=2) if options.json else table(results))
+    return 0
+
+
+def _scene(options: argparse.Namespace) -> Scene:
+    from nigemizu.scene import Scene
+
+    scene = Scene.load(options.scene, _overrides(options))
+    return scene
+
+
+def _overrides(options: argparse.Namespace) -> dict[str, Any]:
+    from nigemizu.scene.reading import parse_assignment
+
+    changes = dict(parse_assignment(text) for text in options.overrides)
+    for flag, key in _FLAG_KEYS.items():
+        if getattr(options, flag, None) is not None:
+            changes[key] = getattr(options, flag)
+    if getattr(options, "size", None) is not None:
+        changes["camera.width"], changes["camera.height"] = options.size
+    if getattr(options, "duration", None) is not None:
+        changes["film.duration" if options.verb == "animate" else "time.duration"] = options.duration
+    return changes
+
+
+def _output(options: argparse.Namespace, suffix: str) -> Path:
+    return Path(options.output) if options.output is not None else Path(Path(options.scene).stem + suffix)
+
+
+def _use_threads(count: int | None) -> None:
+    """Limit the threads of the compiled loops of both stages."""
+    if count is None:
+        return
+    import drjit
+    import numba
+
+    drjit.set_thread_count(count)
+    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))

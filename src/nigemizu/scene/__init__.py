@@ -1,0 +1,7 @@
+"""One frozen, validated model of a whole experiment, the TOML file that holds it, and the built-in scenes."""
+
+from __future__ import annotations
+
+from nigemizu.scene.model import FilmSpec, Scene, TimeSpec, builtin_scenes, load
+
+__all__ = ["FilmSpec", "Scene", "TimeSpec", "builtin_scenes", "load"]

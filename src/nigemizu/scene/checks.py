@@ -1,0 +1,91 @@
+"""What cannot work although each value is valid by itself."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nigemizu.errors import InputError, NigemizuWarning
+from nigemizu.values import Value
+
+if TYPE_CHECKING:
+    from nigemizu.scene.model import Scene
+
+__all__ = ["check"]
+
+# A camera beyond these is a slip of the keyboard, not a place to stand.
+_HIGHEST_EYE, _FARTHEST_EYE = 1e5, 1e6
+
+
+def check(scene: Scene, available: Callable[[], int | None]) -> None:
+    """See `nigemizu.scene.Scene.check`."""
+    _check_files(scene)
+    _check_camera(scene)
+    _check_memory(scene, available)
+    _check_extent(scene)
+
+
+def _check_files(scene: Scene) -> None:
+    for key, path in _paths(scene, ""):
+        if not path.expanduser().exists():
+            raise InputError("no such file", key=key, value=str(path))
+
+
+def _paths(value: Value, prefix: str) -> Iterator[tuple[str, Path]]:
+    for name in type(value).model_fields:
+        content = getattr(value, name)
+        entries = content if isinstance(content, tuple) else (content,)
+        for position, entry in enumerate(entries):
+            key = f"{prefix}{name}" + (f".{position}" if isinstance(content, tuple) else "")
+            if isinstance(entry, Path):
+                yield key, entry
+            elif isinstance(entry, Value):
+                yield from _paths(entry, f"{key}.")
+
+
+def _check_camera(scene: Scene) -> None:
+    x, y, z = scene.camera.eye
+    ground = max((entry.height for entry in scene.objects if entry.kind == "ground"), default=0.0)
+    if z <= ground:
+        raise InputError(
+            "the eye is below the ground", key="camera.eye", value=list(scene.camera.eye), expected=f"z > {ground:g} m"
+        )
+    if z > _HIGHEST_EYE or max(abs(x), abs(y)) > _FARTHEST_EYE:
+        raise InputError(
+            "the eye is far from everything",
+            key="camera.eye",
+            value=list(scene.camera.eye),
+            expected=f"metres, within {_FARTHEST_EYE:g} m of the origin and below {_HIGHEST_EYE:g} m",
+        )
+    if scene.camera.target == scene.camera.eye:
+        raise InputError("is where the eye is", key="camera.target", value=list(scene.camera.eye))
+
+
+def _check_memory(scene: Scene, available: Callable[[], int | None]) -> None:
+    needed, at_hand = scene.grid.memory(), available()
+    if at_hand is not None and needed > at_hand:
+        raise InputError(
+            f"the volume needs {needed / 1e9:.1f} GB of memory and {at_hand / 1e9:.1f} GB are available",
+            key="grid.cells",
+            value=list(scene.grid.cells),
+            remedy="use fewer cells",
+        )
+
+
+def _check_extent(scene: Scene) -> None:
+    if scene.tracer.beyond != "straight":
+        return
+    low, high = scene.grid.x
+    right, left = scene.grid.y
+    for position, entry in enumerate(scene.objects):
+        place = getattr(entry, "position", None)
+        if place is None or (low <= place[0] <= high and right <= place[1] <= left):
+            continue
+        warnings.warn(
+            f"objects.{position} ({entry.kind}) stands outside the grid, where light goes straight; "
+            "enlarge grid.x and grid.y, or set tracer.beyond = 'extend'",
+            NigemizuWarning,
+            stacklevel=4,
+        )

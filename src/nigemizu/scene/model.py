@@ -1,0 +1,409 @@
+"""The scene: one frozen, validated description of a whole experiment."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Self, final
+
+from pydantic import Field, model_validator
+
+from nigemizu.air import Atmosphere
+from nigemizu.errors import InputError
+from nigemizu.heat.boundary import GroundBoundary, Sides, Top
+from nigemizu.heat.grid import GridSpec
+from nigemizu.heat.initial import Initial
+from nigemizu.heat.transport import Diffusivity, Wind
+from nigemizu.progress import SILENT, ProgressMeter
+from nigemizu.render import Camera, Light, Object
+from nigemizu.scene.memory import memory_available
+from nigemizu.scene.reading import apply_overrides, parse_toml, read_text, validate
+from nigemizu.scene.writing import to_toml
+from nigemizu.trace import Tracer
+from nigemizu.values import Value, nearest
+
+if TYPE_CHECKING:
+    import xarray
+
+    from nigemizu.scene import running
+    from nigemizu.scene.picture import RenderedPicture
+    from nigemizu.scene.rays import TracedRays
+
+__all__ = ["FilmSpec", "Scene", "TimeSpec", "builtin_scenes", "load"]
+
+
+@final
+class TimeSpec(Value):
+    """The time that is simulated, from 0.
+
+    Parameters
+    ----------
+    duration : float, s
+        End of the simulated time.
+    picture : float, s, optional
+        Instant that a single picture shows; the end unless given.
+    store_every : float, s, optional
+        Time between the instants that a dataset stores; a tenth of the duration unless given.
+    step : float, s, optional
+        Time step of the heat stage; chosen for accuracy unless given.
+    """
+
+    duration: Annotated[float, Field(ge=0, json_schema_extra={"unit": "s"})] = 600.0
+    picture: Annotated[float, Field(ge=0)] | None = Field(None, json_schema_extra={"unit": "s"})
+    store_every: Annotated[float, Field(gt=0)] | None = Field(None, json_schema_extra={"unit": "s"})
+    step: Annotated[float, Field(gt=0)] | None = Field(None, json_schema_extra={"unit": "s"})
+
+    @property
+    def shown(self) -> float:
+        """Instant of a single picture [s]."""
+        return self.duration if self.picture is None else self.picture
+
+    @property
+    def stored(self) -> tuple[float, ...]:
+        """Instants of a dataset [s], from 0 to the end."""
+        every = self.store_every or self.duration / 10.0
+        if every <= 0.0:
+            return (0.0,)
+        inner = [index * every for index in range(int(self.duration / every * (1 + 1e-12)) + 1)]
+        if self.duration - inner[-1] > 1e-9 * self.duration:
+            inner.append(self.duration)
+        return tuple(inner)
+
+
+@final
+class FilmSpec(Value):
+    """The film: which instants it shows and how fast it plays.
+
+    Parameters
+    ----------
+    start : float, s
+        Instant of the first frame.
+    duration : float, s
+        Time that passes in the scene from the first frame to the end of the last.
+    frames : int
+        Number of frames.
+    fps : int, s-1
+        Frames per second when played.
+    """
+
+    start: Annotated[float, Field(ge=0, json_schema_extra={"unit": "s"})] = 0.0
+    duration: Annotated[float, Field(gt=0, json_schema_extra={"unit": "s"})] = 5.0
+    frames: Annotated[int, Field(ge=1, le=1_000_000)] = 125
+    fps: Annotated[int, Field(ge=1, le=240)] = 25
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Instants of the frames [s]."""
+        return tuple(self.start + self.duration * index / self.frames for index in range(self.frames))
+
+
+@final
+class Scene(Value):
+    """A whole experiment: the air, how it is heated, how light crosses it, and what is seen.
+
+    The same model is the TOML file, this class, and what the command line's ``--set`` changes.
+
+    Parameters
+    ----------
+    title : str
+        A few words.
+    description : str
+        What is shown, and where its numbers come from.
+    air : Atmosphere
+        Pressure, humidity, wavelength and law of refraction.
+    grid : GridSpec
+        The mesh of the air.
+    initial : Initial
+        Temperature at the beginning.
+    ground, sides, top : GroundBoundary, Sides, Top
+        Boundaries of the air.
+    diffusivity, wind : Diffusivity, Wind
+        How heat spreads and is carried.
+    time, film : TimeSpec, FilmSpec
+        What is simulated, and what a film shows.
+    tracer : Tracer
+        How rays are followed.
+    camera, light : Camera, Light
+        The eye, and sun and sky.
+    objects : tuple of Object
+        What stands in the scene.
+
+    Examples
+    --------
+    >>> scene = Scene.load("pyramid", {"camera.samples": 4})
+    >>> scene.camera.samples
+    4
+    >>> Scene.from_toml(scene.to_toml()) == scene
+    True
+    """
+
+    title: str = ""
+    description: str = ""
+    air: Atmosphere = Atmosphere()
+    grid: GridSpec
+    initial: Initial
+    ground: GroundBoundary
+    sides: Sides = Sides()
+    top: Top = Top()
+    diffusivity: Diffusivity = Diffusivity()
+    wind: Wind = Wind()
+    time: TimeSpec = TimeSpec()
+    film: FilmSpec = FilmSpec()
+    tracer: Tracer = Tracer()
+    camera: Camera = Camera()
+    light: Light = Light()
+    objects: tuple[Object, ...] = ()
+
+    @model_validator(mode="after")
+    def _picture_is_simulated(self) -> Self:
+        if self.time.picture is not None and self.time.picture > self.time.duration:
+            raise InputError(
+                "lies after the simulated time",
+                key="time.picture",
+                value=self.time.picture,
+                expected=f"at most time.duration, {self.time.duration:g} s",
+            )
+        return self
+
+    @classmethod
+    def load(cls, name_or_path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Self:
+        """Read a built-in scene or a TOML file.
+
+        Parameters
+        ----------
+        name_or_path : str or path
+            Name of a built-in scene (`builtin_scenes`) or path of a TOML file.
+        overrides : mapping, optional
+            ``{"section.key": value}`` to replace, as ``--set`` does.
+
+        Raises
+        ------
+        InputError
+            If there is no such scene or anything in it cannot be used.
+        """
+        name = os.fspath(name_or_path)
+        if name in _builtin_names():
+            text = _builtin_folder().joinpath(f"{name}.toml").read_text(encoding="utf-8")
+            return cls.from_toml(text, file=name, overrides=overrides)
+        path = Path(name).expanduser()
+        if not path.is_file():
+            raise InputError(
+                "no such scene or file", file=name, remedy=nearest(name, _builtin_names())
+            )
+        return cls.from_toml(read_text(path), file=name, folder=path.resolve().parent, overrides=overrides)
+
+    @classmethod
+    def from_toml(
+        cls,
+        text: str,
+        *,
+        file: str | None = None,
+        folder: Path | None = None,
+        overrides: Mapping[str, Any] | None = None,
+    ) -> Self:
+        """Read a scene from TOML text; relative paths in it count from `folder` (the working directory)."""
+        data = apply_overrides(parse_toml(text, file), overrides or {})
+        return validate(cls, data, file=file, folder=folder or Path.cwd())
+
+    def with_changes(self, overrides: Mapping[str, Any]) -> Self:
+        """Return a scene with ``{"section.key": value}`` replaced, and everything validated again."""
+        return self.from_toml(self.to_toml(), overrides=overrides)
+
+    def to_toml(self, *, comments: bool = False) -> str:
+        """Write the scene as TOML that reads back into an equal scene.
+
+        With `comments`, unit and meaning stand beside each key.
+        """
+        return to_toml(self, comments=comments)
+
+    @classmethod
+    def json_schema(cls) -> dict[str, Any]:
+        """JSON schema of scene files; editors with TOML support complete and check keys with it."""
+        from nigemizu.scene.schema import schema
+
+        return schema(cls)
+
+    def check(self, *, available: Callable[[], int | None] = memory_available) -> None:
+        """Look for what cannot work although each value is valid by itself.
+
+        Parameters
+        ----------
+        available : callable
+            Tells the bytes of memory at hand, or None.
+
+        Raises
+        ------
+        InputError
+            For an eye below the ground, a volume larger than the memory, a missing file.
+
+        Warns
+        -----
+        NigemizuWarning
+            For objects beyond the air that bends light.
+        """
+        from nigemizu.scene.checks import check
+
+        check(self, available)
+
+    def simulate(
+        self, times: Iterable[float] | None = None, *, progress: ProgressMeter = SILENT
+    ) -> xarray.Dataset:
+        """Heat the air.
+
+        Parameters
+        ----------
+        times : iterable of float, s, optional
+            Instants to keep; those of `time` unless given.
+        progress : ProgressMeter
+            Receives how far the work has come.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``air_temperature``, ``surface_temperature``, ``air_pressure`` and ``air_refractivity`` over
+            ``(time, z, y, x)``.
+        """
+        from nigemizu.scene import running
+
+        return running.simulate(self, self.time.stored if times is None else tuple(times), progress)
+
+    def air_at(
+        self,
+        time: float | None = None,
+        *,
+        air: xarray.Dataset | str | os.PathLike[str] | None = None,
+        progress: ProgressMeter = SILENT,
+    ) -> running.AirVolume:
+        """The refractive-index volume at an instant [s], simulated, or taken from the dataset `air`."""
+        from nigemizu.scene import running
+
+        return running.air_at(self, time, air, progress)
+
+    def render(
+        self,
+        time: float | None = None,
+        *,
+        air: xarray.Dataset | str | os.PathLike[str] | None = None,
+        method: str | None = None,
+        samples: int | None = None,
+        variant: str = "auto",
+        progress: ProgressMeter = SILENT,
+    ) -> RenderedPicture:
+        """Render one picture.
+
+        Parameters
+        ----------
+        time : float, s, optional
+            Instant to show; that of `time` unless given.
+        air : dataset or path, optional
+            Air to look through instead of simulating it.
+        method : {"bent", "straight", "layered"}, optional
+            How light travels, instead of ``tracer.method``.
+        samples : int, optional
+            Rays per pixel, instead of ``camera.samples``.
+        variant : {"auto", "llvm", "cuda"}
+            Compute device; one per process.
+        progress : ProgressMeter
+            Receives how far the work has come.
+
+        Returns
+        -------
+        RenderedPicture
+            Its ``pixels`` are linear light; ``save("x.png")`` and ``save("x.exr")`` write it.
+        """
+        from nigemizu.scene import running
+
+        return running.render(self._seen(method, samples), time, air, variant, progress)
+
+    def animate(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        air: xarray.Dataset | str | os.PathLike[str] | None = None,
+        method: str | None = None,
+        samples: int | None = None,
+        workers: int = 1,
+        variant: str = "auto",
+        progress: ProgressMeter = SILENT,
+    ) -> Path:
+        """Render the film `film` into an MP4 and a folder of numbered frames beside it.
+
+        A film that was interrupted goes on where it stopped when this is called again.
+
+        Parameters
+        ----------
+        path : path
+            The ``.mp4`` to write.
+        workers : int
+            Processes that render. More than one needs the calling script to protect its main part with
+            ``if __name__ == "__main__":``.
+        air, method, samples, variant, progress
+            As for `render`.
+
+        Returns
+        -------
+        Path
+            Where the film is.
+        """
+        from nigemizu.scene import film
+
+        return film.animate(self._seen(method, samples), Path(path), air, workers, variant, progress)
+
+    def trace(
+        self,
+        elevations: Iterable[float] | None = None,
+        azimuths: Iterable[float] | None = None,
+        *,
+        time: float | None = None,
+        air: xarray.Dataset | str | os.PathLike[str] | None = None,
+        method: str | None = None,
+        variant: str = "auto",
+        progress: ProgressMeter = SILENT,
+    ) -> TracedRays:
+        """Follow single rays from the eye.
+
+        Parameters
+        ----------
+        elevations : iterable of float, degrees, optional
+            Above the horizontal; a fan over the camera's view unless given.
+        azimuths : iterable of float, degrees, optional
+            From the camera's heading, positive to the left; 0 unless given. Every elevation is traced at
+            every azimuth.
+        time, air, method, variant, progress
+            As for `render`.
+
+        Returns
+        -------
+        TracedRays
+            One record per ray, and the paths; ``save("rays.svg")`` draws the ray diagram.
+        """
+        from nigemizu.scene import rays
+
+        return rays.trace(self._seen(method, None), elevations, azimuths, time, air, variant, progress)
+
+    def _seen(self, method: str | None, samples: int | None) -> Scene:
+        changes = {"tracer.method": method, "camera.samples": samples}
+        given = {key: value for key, value in changes.items() if value is not None}
+        return self.with_changes(given) if given else self
+
+
+def load(name_or_path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
+    """Read a built-in scene or a TOML file; see `Scene.load`."""
+    return Scene.load(name_or_path, overrides)
+
+
+def builtin_scenes() -> dict[str, str]:
+    """Names of the built-in scenes and their titles."""
+    return {name: Scene.load(name).title for name in _builtin_names()}
+
+
+def _builtin_folder() -> Traversable:
+    return resources.files("nigemizu.scene") / "builtin"
+
+
+def _builtin_names() -> tuple[str, ...]:
+    names = (entry.name for entry in _builtin_folder().iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
