@@ -44,11 +44,11 @@ class Camera(Value):
         Seed of the sampling; the same seed gives the same picture.
     """
 
-    eye: Coordinates = (0.0, 0.0, 1.7)
-    target: Coordinates | None = None
-    heading: Annotated[float, Field(ge=-360, le=360)] = 0.0
-    pitch: Annotated[float, Field(gt=-90, lt=90)] = 0.0
-    field_of_view: Annotated[float, Field(gt=0, lt=170)] = 6.0
+    eye: Coordinates = Field((0.0, 0.0, 1.7), json_schema_extra={"unit": "m"})
+    target: Coordinates | None = Field(None, json_schema_extra={"unit": "m"})
+    heading: Annotated[float, Field(ge=-360, le=360, json_schema_extra={"unit": "degree"})] = 0.0
+    pitch: Annotated[float, Field(gt=-90, lt=90, json_schema_extra={"unit": "degree"})] = 0.0
+    field_of_view: Annotated[float, Field(gt=0, lt=170, json_schema_extra={"unit": "degree"})] = 6.0
     width: Annotated[int, Field(ge=1, le=16384)] = 960
     height: Annotated[int, Field(ge=1, le=16384)] = 540
     samples: Annotated[int, Field(ge=1, le=1_000_000)] = 64

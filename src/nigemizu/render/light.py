@@ -49,12 +49,12 @@ class Light(Value):
     """
 
     sky: Literal["sunsky", "gradient", "constant"] = "sunsky"
-    sun_azimuth: Annotated[float, Field(ge=-360, le=360)] = 130.0
-    sun_elevation: Annotated[float, Field(gt=0, le=90)] = 50.0
+    sun_azimuth: Annotated[float, Field(ge=-360, le=360, json_schema_extra={"unit": "degree"})] = 130.0
+    sun_elevation: Annotated[float, Field(gt=0, le=90, json_schema_extra={"unit": "degree"})] = 50.0
     turbidity: Annotated[float, Field(ge=1, le=10)] = 3.0
     ground_albedo: Annotated[float, Field(ge=0, le=1)] = 0.3
     sun_scale: Annotated[float, Field(ge=0)] = 1.0
     sky_scale: Annotated[float, Field(ge=0)] = 1.0
     horizon_colour: Radiance = (0.75, 0.85, 1.0)
     zenith_colour: Radiance = (0.15, 0.35, 0.8)
-    visibility: Annotated[float, Field(gt=0)] | None = None
+    visibility: Annotated[float, Field(gt=0)] | None = Field(None, json_schema_extra={"unit": "m"})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal, final
 
 from pydantic import Field
@@ -11,7 +12,8 @@ from nigemizu.values import Value
 
 __all__ = ["Asphalt", "Checker", "Colour", "Masonry", "Material", "Sand", "Texture"]
 
-Length = Annotated[float, Field(gt=0)]
+Length = Annotated[float, Field(gt=0, json_schema_extra={"unit": "m"})]
+Positive = Annotated[float, Field(gt=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
@@ -29,15 +31,15 @@ class Texture(Value):
 
     Parameters
     ----------
-    image : str
+    image : path
         Path of a PNG, JPEG or EXR file.
     repeat : (u, v)
         How often the image is repeated across the surface.
     """
 
     kind: Literal["texture"] = "texture"
-    image: str
-    repeat: tuple[Length, Length] = (1.0, 1.0)
+    image: Path
+    repeat: tuple[Positive, Positive] = (1.0, 1.0)
 
 
 @final

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any, Literal, final
 
 from pydantic import Field, model_validator
@@ -24,9 +25,10 @@ __all__ = [
     "Vehicle",
 ]
 
-Length = Annotated[float, Field(gt=0)]
-Degrees = Annotated[float, Field(ge=-360, le=360)]
-Position = tuple[float, float, float]
+Length = Annotated[float, Field(gt=0, json_schema_extra={"unit": "m"})]
+Coordinate = Annotated[float, Field(json_schema_extra={"unit": "m"})]
+Degrees = Annotated[float, Field(ge=-360, le=360, json_schema_extra={"unit": "degree"})]
+Position = Annotated[tuple[float, float, float], Field(json_schema_extra={"unit": "m"})]
 
 
 @final
@@ -52,10 +54,10 @@ class Road(Value):
         Reflectance of the paint.
     """
 
-    centre: float = 0.0
+    centre: Coordinate = 0.0
     width: Length = 7.5
     line_width: Length = 0.15
-    edge_inset: Annotated[float, Field(ge=0)] = 0.25
+    edge_inset: Annotated[float, Field(ge=0, json_schema_extra={"unit": "m"})] = 0.25
     dash: Length = 6.0
     gap: Length = 9.0
     surface: Asphalt = Asphalt()
@@ -77,7 +79,7 @@ class Ground(Value):
     """
 
     kind: Literal["ground"] = "ground"
-    height: float = 0.0
+    height: Coordinate = 0.0
     material: Material = Sand()
     road: Road | None = None
 
@@ -112,7 +114,10 @@ class Box(Value):
 
     kind: Literal["box"] = "box"
     position: Position
-    size: tuple[Length, Length, Length] = (1.0, 1.0, 1.0)
+    size: Annotated[
+        tuple[Annotated[float, Field(gt=0)], Annotated[float, Field(gt=0)], Annotated[float, Field(gt=0)]],
+        Field(json_schema_extra={"unit": "m"}),
+    ] = (1.0, 1.0, 1.0)
     rotation: Degrees = 0.0
     material: Material = Colour()
 
@@ -157,7 +162,7 @@ class Mesh(Value):
 
     Parameters
     ----------
-    file : str
+    file : path
         Path of a PLY or OBJ file.
     position : (x, y, z), m
         Where the file's origin goes.
@@ -172,10 +177,10 @@ class Mesh(Value):
     """
 
     kind: Literal["mesh"] = "mesh"
-    file: str
+    file: Path
     position: Position = (0.0, 0.0, 0.0)
     rotation: Degrees = 0.0
-    scale: Length = 1.0
+    scale: Annotated[float, Field(gt=0)] = 1.0
     up: Literal["z", "y"] = "z"
     material: Material = Colour()
 
@@ -204,8 +209,8 @@ class Hills(Value):
     distance: Length = 9000.0
     height: Length = 150.0
     azimuth: Degrees = 0.0
-    spread: Annotated[float, Field(gt=0, le=360)] = 30.0
-    base: float = 0.0
+    spread: Annotated[float, Field(gt=0, le=360, json_schema_extra={"unit": "degree"})] = 30.0
+    base: Coordinate = 0.0
     seed: Annotated[int, Field(ge=0)] = 0
     colour: Reflectance = (0.22, 0.19, 0.15)
 
@@ -232,7 +237,7 @@ class Vehicle(Value):
     position: Position
     heading: Degrees = 180.0
     colour: Reflectance = (0.45, 0.03, 0.02)
-    length: Annotated[float, Field(ge=2, le=12)] = 4.4
+    length: Annotated[float, Field(ge=2, le=12, json_schema_extra={"unit": "m"})] = 4.4
     headlights: bool = False
 
 
@@ -242,7 +247,7 @@ class MitsubaFile(Value):
 
     Parameters
     ----------
-    file : str, optional
+    file : path, optional
         Path of a Mitsuba XML scene; its shapes (with their materials and area lights) are taken, its
         integrator, sensor and environment are not.
     fragment : dict, optional
@@ -250,7 +255,7 @@ class MitsubaFile(Value):
     """
 
     kind: Literal["mitsuba"] = "mitsuba"
-    file: str | None = None
+    file: Path | None = None
     fragment: dict[str, Any] | None = None
 
     @model_validator(mode="after")

@@ -1,0 +1,205 @@
+"""Procedural textures as Mitsuba plug-ins, filtered over the footprint of a pixel.
+
+A telephoto view along the ground squeezes a hundred metres into one pixel; patterns finer than a pixel are
+replaced by their mean in closed form, so that no ray is spent on averaging them.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, Final
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["texture_classes"]
+
+_TILE: Final = 512  # texels of the noise tile
+_PERIOD: Final = 8  # texels per wavelength of its noise
+_FINEST: Final = 0.1  # m, shortest wavelength of ground noise
+
+
+def noise_tile(seed: int) -> NDArray[np.float32]:
+    """A periodic image of smooth noise of one wavelength: (512, 512) float32, mean 0, rms 1."""
+    frequency = np.fft.fftfreq(_TILE) * _PERIOD
+    radius = np.hypot(frequency[:, None], frequency[None, :])
+    band = np.exp(-(((radius - 1.0) / 0.35) ** 2))
+    white = np.random.default_rng(np.random.SeedSequence(seed)).standard_normal((_TILE, _TILE))
+    image = np.fft.ifft2(np.fft.fft2(white) * band).real
+    return np.asarray((image - image.mean()) / image.std(), dtype=np.float32)
+
+
+@functools.cache
+def texture_classes(variant: str) -> dict[str, Any]:
+    """Plug-in name → class, under `variant`, which must be the one in use."""
+
+    class Procedural(mi.Texture):  # type: ignore[misc]
+        """A pattern in scene coordinates, seen from `eye` with pixels of `pixel_angle` radians."""
+
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            self.eye = dr.opaque(mi.Point3f, mi.Point3f(props.get("eye", mi.ScalarPoint3f(0))))
+            self.pixel_angle = dr.opaque(mi.Float, props.get("pixel_angle", 1e-3))
+            self.colour = dr.opaque(mi.Color3f, mi.Color3f(props["colour"]))
+            self.contrast = dr.opaque(mi.Float, props.get("contrast", 0.0))
+            tile = noise_tile(int(props.get("seed", 0)))
+            self.tile = mi.Texture2f(mi.TensorXf(tile[..., None]), wrap_mode=dr.WrapMode.Repeat)
+
+        def footprint(self, si: Any) -> tuple[Any, Any, Any]:
+            """Width of a pixel on the surface across the line of sight, and its extents along x and y."""
+            sight = si.p - self.eye
+            distance = dr.norm(sight)
+            across = self.pixel_angle * distance
+            along = across / dr.maximum(dr.abs(dr.dot(sight, si.n)) / distance, 1e-5)
+            level = dr.maximum(dr.sqrt(sight.x**2 + sight.y**2), 1e-6)
+            x, y = dr.abs(sight.x) / level, dr.abs(sight.y) / level
+            return across, along * x + across * y, along * y + across * x
+
+        def noise(self, x: Any, y: Any, length: float, turn: float) -> Any:
+            """Noise of wavelength `length`, turned by `turn` radians so that octaves do not line up."""
+            scale = _PERIOD / (_TILE * length)
+            c, s = float(np.cos(turn)) * scale, float(np.sin(turn)) * scale
+            return self.tile.eval(mi.Point2f(c * x - s * y + 0.37 * turn, s * x + c * y + 0.61 * turn))[0]
+
+        def octaves(self, si: Any, across: Any, coarsest: float, finest: float) -> Any:
+            """Sum of ever finer noise; what is finer than a pixel fades away."""
+            total, length, turn = mi.Float(0), coarsest, 0.3
+            while length >= finest:
+                visible = dr.exp(-((across / (0.5 * length)) ** 2))
+                total += 0.4 * visible * self.noise(si.p.x, si.p.y, length, turn)
+                length, turn = length / 2.9, turn + 1.1
+            return total
+
+        def pattern(self, si: Any) -> Any:
+            return self.colour
+
+        def eval(self, si: Any, active: Any = True) -> Any:
+            return dr.clip(self.pattern(si), 0, 1)
+
+        def eval_1(self, si: Any, active: Any = True) -> Any:
+            return mi.luminance(self.eval(si, active))
+
+        def mean(self) -> Any:
+            return mi.luminance(self.colour)
+
+        def is_spatially_varying(self) -> bool:
+            return True
+
+        def to_string(self) -> str:
+            return f"{type(self).__name__}[]"
+
+    class Ground(Procedural):
+        """Sand, and on it a road along x (none where its width is 0)."""
+
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            self.scale = float(props.get("scale", 100.0))
+            self.road = float(props.get("road_width", 0.0))
+            self.centre = float(props.get("road_centre", 0.0))
+            self.asphalt = mi.Color3f(props.get("road_colour", mi.ScalarColor3f(0.1)))
+            self.grain = float(props.get("road_contrast", 0.0))
+            self.paint = mi.Color3f(props.get("line_colour", mi.ScalarColor3f(0.6)))
+            self.line = float(props.get("line_width", 0.15))
+            self.inset = float(props.get("edge_inset", 0.25))
+            self.dash = float(props.get("dash", 6.0))
+            self.gap = float(props.get("gap", 9.0))
+
+        def pattern(self, si: Any) -> Any:
+            across, wide_x, wide_y = self.footprint(si)
+            uneven = self.octaves(si, across, self.scale, _FINEST)
+            # Bright sand is a little yellower than dark sand.
+            tint = mi.Color3f(1.0, 0.97, 0.9)
+            sand = self.colour * (1 + self.contrast * uneven * tint)
+            if self.road == 0:
+                return sand
+            y = si.p.y - self.centre
+            half = self.road / 2
+            wander = 0.06 * self.noise(si.p.x, 0.3 * si.p.x, 2.5, 0.7)
+            on_road = _strip(dr.abs(y) + wander, -half, half, wide_y)
+            return dr.lerp(sand, self.road_surface(si, y, across, wide_x, wide_y), on_road)
+
+        def road_surface(self, si: Any, y: Any, across: Any, wide_x: Any, wide_y: Any) -> Any:
+            half, lane = self.road / 2, self.road / 4
+            # Wheels polish two tracks per lane, and oil darkens the stripe between them.
+            from_lane = dr.abs(dr.abs(y) - lane)
+            tracks = dr.exp(-(((from_lane - 0.8) / 0.3) ** 2)) - 0.6 * dr.exp(-((from_lane / 0.35) ** 2))
+            grain = self.octaves(si, across, 9.0, 0.02)
+            surface = self.asphalt * (1 + 0.12 * tracks + self.grain * grain)
+            edge = half - self.inset
+            lines = _strip(dr.abs(y), edge - self.line, edge, wide_y)
+            period = self.dash + self.gap
+            dashes = _strip(y, -self.line / 2, self.line / 2, wide_y) * _pulses(
+                si.p.x, self.dash, period, wide_x
+            )
+            worn = 0.92 + 0.06 * grain
+            return dr.lerp(surface, self.paint * worn, dr.minimum(lines + dashes, 1))
+
+    class Checker(Procedural):
+        """Chessboard of horizontal coordinates."""
+
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            self.other = dr.opaque(mi.Color3f, mi.Color3f(props["other"]))
+            self.size = float(props["size"])
+
+        def pattern(self, si: Any) -> Any:
+            _, wide_x, wide_y = self.footprint(si)
+            x = 2 * _pulses(si.p.x, self.size, 2 * self.size, wide_x) - 1
+            y = 2 * _pulses(si.p.y, self.size, 2 * self.size, wide_y) - 1
+            return dr.lerp(self.colour, self.other, 0.5 + 0.5 * x * y)
+
+    class Masonry(Procedural):
+        """Courses of stones; `base` is the z of the first, `turn` the building's rotation in radians."""
+
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            self.course = float(props["course"])
+            self.centre = mi.ScalarPoint3f(props.get("centre", mi.ScalarPoint3f(0)))
+            self.turn = float(props.get("turn", 0.0))
+
+        def pattern(self, si: Any) -> Any:
+            across, _, _ = self.footprint(si)
+            c, s = float(np.cos(self.turn)), float(np.sin(self.turn))
+            p, n = si.p - self.centre, si.n
+            x, y = c * p.x + s * p.y, c * p.y - s * p.x
+            facing_x = dr.abs(c * n.x + s * n.y) > dr.abs(c * n.y - s * n.x)
+            along = dr.select(facing_x, y, x + 1000.0)
+            row = dr.floor(p.z / self.course)
+            length = 1.7 * self.course
+            shifted = along / length + 0.618 * row
+            stone = dr.floor(shifted)
+            own = self.lottery(row, stone)
+            whole_row = self.lottery(row, mi.Float(-7))
+            stain = self.noise(along, 0.35 * p.z, 9 * self.course, 0.9)
+            joint = _strip(p.z - row * self.course, 0, 0.1 * self.course, across)
+            side = _strip((shifted - stone) * length, 0, 0.08 * self.course, across)
+            shade = 1 + self.contrast * (0.25 * own + 0.2 * whole_row + 0.2 * stain)
+            return self.colour * shade * (1 - 0.35 * dr.maximum(joint, side))
+
+        def lottery(self, a: Any, b: Any) -> Any:
+            """A number of mean 0 and rms about 1 that depends on two whole numbers."""
+            u = mi.Point2f(a * 0.7548777 + b * 0.2451223, a * 0.5698403 + b * 0.4301597)
+            return self.tile.eval(u - dr.floor(u))[0]
+
+    return {"nigemizu_ground": Ground, "nigemizu_checker": Checker, "nigemizu_masonry": Masonry}
+
+
+def _strip(y: Any, lower: Any, upper: Any, width: Any) -> Any:
+    """Part of the interval of `width` around y that lies between lower and upper."""
+    width = dr.maximum(width, 1e-3)
+    return dr.clip((dr.minimum(y + width / 2, upper) - dr.maximum(y - width / 2, lower)) / width, 0, 1)
+
+
+def _pulses(x: Any, on: float, period: float, width: Any) -> Any:
+    """Mean over `width` around x of a wave that is 1 for the length `on` of each `period`, else 0."""
+    width = dr.maximum(width, 2e-2)
+
+    def integral(position: Any) -> Any:
+        whole = dr.floor(position / period)
+        return whole * on + dr.minimum(position - whole * period, on)
+
+    mean = (integral(x + width / 2) - integral(x - width / 2)) / width
+    # Over many periods the mean is all that is left, and the difference above would lose its digits.
+    return dr.select(width > 8 * period, on / period, dr.clip(mean, 0, 1))
