@@ -104,10 +104,11 @@ def refractivity(
     water, water_is_fraction = _water(relative_humidity, vapour_fraction)
 
     operands = [temperature, pressure, dry, wet, water]
+    output = np.empty(np.broadcast_shapes(*(operand.shape for operand in operands)))
     blocks = np.nditer(
-        [*operands, None],  # None: the result, which the iterator allocates
+        [*operands, output],
         flags=["external_loop", "buffered", "zerosize_ok"],
-        op_flags=[*[["readonly"]] * 5, ["writeonly", "allocate"]],  # type: ignore[list-item]
+        op_flags=[*[["readonly"]] * 5, ["writeonly"]],  # type: ignore[list-item]
         op_dtypes=np.float64,
         buffersize=_BLOCK,
     )
@@ -119,7 +120,6 @@ def refractivity(
                 fraction = x if water_is_fraction else law.vapour(t, p, x)
                 moist.refuse_boiling(fraction)
             law.kernel(t, p, fraction, c_dry, c_wet, result)
-        output: FloatArray = blocks.operands[-1]
     return output if output.ndim else output[()]
 
 
