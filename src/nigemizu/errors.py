@@ -49,6 +49,17 @@ class InputError(NigemizuError):
         self.remedy = remedy
         super().__init__(self._line())
 
+    def in_file(self, file: str | None) -> InputError:
+        """The same error, saying in which file unless it says so already."""
+        return InputError(
+            self.problem,
+            key=self.key,
+            file=self.file or file,
+            value=self.value,
+            expected=self.expected,
+            remedy=self.remedy,
+        )
+
     def _line(self) -> str:
         where = ": ".join(part for part in (self.file, self.key) if part)
         shown = f" (got {_short(self.value)})" if self.value is not None else ""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -128,7 +130,8 @@ def check(options: argparse.Namespace) -> int:
     overrides = _overrides(options)
     for name in options.scene:
         scene = Scene.load(name, overrides)
-        scene.check()
+        with _naming(name):
+            scene.check()
         nz, ny, nx = scene.grid.cells[::-1]
         print(f"{name}: valid ({scene.title or 'untitled'}; {nx}×{ny}×{nz} cells, {len(scene.objects)} objects)")
     return 0
@@ -163,8 +166,16 @@ def bench(options: argparse.Namespace) -> int:
 def _scene(options: argparse.Namespace) -> Scene:
     from nigemizu.scene import Scene
 
-    scene = Scene.load(options.scene, _overrides(options))
-    return scene
+    return Scene.load(options.scene, _overrides(options))
+
+
+@contextmanager
+def _naming(file: str) -> Iterator[None]:
+    """Let errors about the scene say which file it came from."""
+    try:
+        yield
+    except InputError as error:
+        raise error.in_file(file) from error
 
 
 def _overrides(options: argparse.Namespace) -> dict[str, Any]:

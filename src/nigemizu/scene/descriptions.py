@@ -10,7 +10,7 @@ import re
 
 from nigemizu.values import Value
 
-__all__ = ["described_fields", "summary"]
+__all__ = ["described_fields", "first_sentence", "summary"]
 
 _SECTION = re.compile(r"^(Parameters|Attributes)\n-+\n(.*?)(?=^\w[^\n]*\n-+\n|\Z)", re.MULTILINE | re.DOTALL)
 _ENTRY = re.compile(r"^(\w[\w, ]*?) : [^\n]*\n((?:[ \t]+[^\n]*\n|\n)*)", re.MULTILINE)
@@ -32,5 +32,11 @@ def described_fields(value: type[Value]) -> dict[str, str]:
     return {name: meaning for name, meaning in meanings.items() if name in value.model_fields and meaning}
 
 
+def first_sentence(text: str) -> str:
+    """What stands beside a key; the whole meaning is in the schema and the documentation."""
+    return re.split(r"(?<=\w{2}[.)])\s+(?=[A-Z])", text, maxsplit=1)[0].rstrip(".")
+
+
 def _plain(text: str) -> str:
-    return text.replace("``", '"').replace("`", "")
+    without_marks = re.sub(r":math:`([^`]*)`", r"\1", text)
+    return re.sub(r"``\"?([^`]*?)\"?``", r'"\1"', without_marks).replace("`", "")

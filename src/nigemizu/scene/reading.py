@@ -38,7 +38,9 @@ _EXPECTED: dict[str, str] = {
     "none_required": "nothing",
 }
 _COMPARISONS: dict[str, str] = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
-_MISMATCH = re.compile(r"(_type|_parsing)$|^(wrong_type|none_required|int_from_float)$")
+# Errors that only say "this alternative was not meant", or that follow from another error.
+_MISMATCH = re.compile(r"(_type|_parsing)$|^(wrong_type|none_required|int_from_float|too_short)$")
+_OWN_KEY = re.compile(r"(\w+): (.*)", re.DOTALL)
 
 
 def read_text(path: Path) -> str:
@@ -129,14 +131,7 @@ def validate(model: type[_Model], data: Mapping[str, Any], *, file: str | None, 
         raise _one_line(error, data, file) from None
     except InputError as error:
         # A room's own check knows its key but not the file.
-        raise InputError(
-            error.problem,
-            key=error.key,
-            file=error.file or file,
-            value=error.value,
-            expected=error.expected,
-            remedy=error.remedy,
-        ) from error
+        raise error.in_file(file) from error
 
 
 def _one_line(error: ValidationError, data: Mapping[str, Any], file: str | None) -> InputError:
@@ -150,12 +145,14 @@ def _one_line(error: ValidationError, data: Mapping[str, Any], file: str | None)
     specific = [item for item in items if not _MISMATCH.search(item["type"])]
     item = (specific or items)[0]
     context = item.get("ctx", {})
-    others = len(found) - 1
     remedy = context.get("remedy")
-    if others and _is_specific(items):
-        others = sum(_is_specific(group) for group in found.values()) - 1
+    # The other alternatives of a union, and what only follows from this error, are no further mistakes.
+    others = sum(
+        not key.startswith(dotted) and (_is_specific(group) or not _is_specific(items))
+        for dotted, group in found.items()
+    )
     if others:
-        remedy = f"{remedy + '; ' if remedy else ''}{others} more after this one"
+        remedy = f"{remedy + '; ' if remedy else ''}{others} more to mend after this one"
     return InputError(
         _problem(item),
         key=key,
@@ -185,6 +182,9 @@ def _dotted_key(item: Mapping[str, Any], data: Any) -> str:
         names.append(str(part))
     key = item.get("ctx", {}).get("key")
     discriminator = item.get("ctx", {}).get("discriminator")
+    own = _OWN_KEY.match(str(item.get("ctx", {}).get("error", "")))
+    if own and isinstance(place, Mapping) and own[1] in place:
+        names.append(own[1])  # a rule about several keys that names the one at fault
     if key is not None:
         names.append(str(key))
     elif isinstance(discriminator, str):
@@ -201,10 +201,13 @@ def _problem(item: Mapping[str, Any]) -> str:
     if kind in ("extra_forbidden", "unexpected_keyword_argument"):
         return "unknown key"
     if kind in ("value_error", "assertion_error"):
-        return str(item["ctx"]["error"])
+        text = str(item["ctx"]["error"])
+        own = _OWN_KEY.match(text)
+        return own[2] if own and isinstance(item["input"], Mapping) and own[1] in item["input"] else text
     if kind in ("literal_error", "enum", "union_tag_invalid"):
         return "unknown word"
-    if any(name in item.get("ctx", {}) for name in _COMPARISONS) or kind in ("too_short", "too_long"):
+    limited = any(name in item.get("ctx", {}) for name in _COMPARISONS)
+    if limited or kind in ("too_short", "too_long", "finite_number"):
         return "out of range"
     if kind in _EXPECTED:
         return "wrong type"
@@ -218,7 +221,8 @@ def _value(item: Mapping[str, Any]) -> object:
     if item["type"] == "union_tag_invalid":
         return context["tag"]
     if item["type"] == "value_error" and isinstance(item["input"], dict):
-        return None
+        own = _OWN_KEY.match(str(context["error"]))
+        return item["input"].get(own[1]) if own else None
     return context.get("given", item["input"])
 
 
@@ -236,4 +240,6 @@ def _expected(item: Mapping[str, Any]) -> str | None:
             return f"a number {sign} {context[name]}"
     if kind == "missing":
         return None
+    if context.get("class_name") == "Quantity":
+        return "a number or a table { … }"
     return context.get("expected") or _EXPECTED.get(kind)

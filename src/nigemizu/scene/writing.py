@@ -8,10 +8,14 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from nigemizu.scene.descriptions import described_fields
+from nigemizu.heat.quantity import Quantity
+from nigemizu.scene.descriptions import described_fields, first_sentence
 from nigemizu.values import Value, field_unit
 
 __all__ = ["to_toml"]
+
+# Longer rows push their own comment to the right, not everyone's.
+_WIDEST = 40
 
 
 def to_toml(value: Value, *, comments: bool = False) -> str:
@@ -40,18 +44,18 @@ def _table(lines: list[str], value: Value, prefix: str, comments: bool) -> None:
     rows: list[tuple[str, str]] = []
     meanings = described_fields(type(value)) if comments else {}
     for name, field in type(value).model_fields.items():
-        content = getattr(value, name)
+        content = _simplest(getattr(value, name))
         if isinstance(content, Value) or _is_table_list(content):
             nested.append((name, content))
             continue
         unit = field_unit(field)
-        words = [f"[{unit}]" if unit else "", meanings.get(name, "")]
+        words = [f"[{unit}]" if unit else "", first_sentence(meanings.get(name, ""))]
         remark = " ".join(filter(None, words))
         if content is not None:
             rows.append((f"{name} = {_literal(content)}", remark))
         elif comments:
             rows.append((f"# {name} =", f"{remark} (unset)".strip()))
-    width = min(44, max((len(text) for text, _ in rows), default=0))
+    width = max((len(text) for text, _ in rows if len(text) <= _WIDEST), default=0)
     for text, remark in rows:
         lines.append(f"{text:{width}}  # {remark}" if comments and remark else text)
     for name, content in nested:
@@ -60,6 +64,13 @@ def _table(lines: list[str], value: Value, prefix: str, comments: bool) -> None:
             brackets = ("[[", "]]") if isinstance(content, tuple | list) else ("[", "]")
             lines.extend(("", f"{brackets[0]}{path}{brackets[1]}"))
             _table(lines, entry, f"{path}.", comments)
+
+
+def _simplest(content: Any) -> Any:
+    """A quantity that does not vary is written as the number that it is."""
+    if isinstance(content, Quantity) and content.is_constant and not content.patterns:
+        return content.value
+    return content
 
 
 def _is_table_list(content: Any) -> bool:

@@ -1,0 +1,114 @@
+"""Running a scene: from its description to air and to pictures."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nigemizu.errors import InputError
+from nigemizu.progress import ProgressMeter
+
+if TYPE_CHECKING:
+    import xarray
+
+    from nigemizu.scene.model import Scene
+
+__all__ = ["AirSource", "AirVolume", "air_at", "air_instants", "open_air", "simulate"]
+
+AirSource: TypeAlias = "xarray.Dataset | str | os.PathLike[str] | None"
+FloatArray: TypeAlias = NDArray[np.float64]
+
+
+class AirVolume(NamedTuple):
+    """The refractive-index volume at one instant.
+
+    Attributes
+    ----------
+    x, y, z : (nx,), (ny,), (nz,) float64, m
+        Positions of the nodes.
+    refractivity : (nz, ny, nx) float64, 1
+        n − 1 at the nodes.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    refractivity: FloatArray
+
+
+def simulate(scene: Scene, times: tuple[float, ...], progress: ProgressMeter) -> xarray.Dataset:
+    """See `nigemizu.scene.Scene.simulate`."""
+    from nigemizu.heat import complete, to_dataset
+
+    scene.check()
+    _require_times(times, scene)
+    states = _states(scene, times, progress)
+    dataset = to_dataset(scene.grid.build(), states, title=scene.title, scene=scene.to_toml())
+    return complete(dataset, scene.air)
+
+
+def air_at(scene: Scene, time: float | None, air: AirSource, progress: ProgressMeter) -> AirVolume:
+    """See `nigemizu.scene.Scene.air_at`."""
+    shown = scene.time.shown if time is None else time
+    return next(iter(air_instants(scene, (shown,), air, progress)))
+
+
+def air_instants(
+    scene: Scene, times: tuple[float, ...], air: AirSource, progress: ProgressMeter
+) -> Iterator[AirVolume]:
+    """The air at each of the instants, one after another; only one is held."""
+    from nigemizu.heat import refractivity_at, to_dataset
+
+    _require_times(times, scene)
+    if air is not None:
+        dataset = open_air(air)
+        for time in times:
+            yield AirVolume(*refractivity_at(dataset, time, scene.air))
+        return
+    grid = scene.grid.build()
+    for state in _states(scene, times, progress):
+        instant = to_dataset(grid, [state])
+        yield AirVolume(*refractivity_at(instant, state.time, scene.air))
+
+
+def open_air(air: AirSource) -> xarray.Dataset:
+    """The dataset, read when it is a file."""
+    from nigemizu.heat import read_air
+
+    if isinstance(air, str | os.PathLike):
+        path = Path(air).expanduser()
+        if not path.exists():
+            raise InputError("no such dataset", key="air", value=str(path), expected="a .zarr or .nc dataset")
+        return read_air(path)
+    assert air is not None
+    return air
+
+
+def _states(scene: Scene, times: tuple[float, ...], progress: ProgressMeter) -> Iterable[State]:
+    from nigemizu.heat import evolve
+
+    grid = scene.grid.build()
+    return evolve(
+        grid,
+        scene.initial.sample(grid),
+        ground=scene.ground,
+        sides=scene.sides,
+        top=scene.top,
+        diffusivity=scene.diffusivity,
+        wind=scene.wind,
+        times=times,
+        time_step=scene.time.step,
+        progress=progress,
+    )
+
+
+def _require_times(times: tuple[float, ...], scene: Scene) -> None:
+    if not times:
+        raise InputError("no instant was asked for", key="times")
+    if not all(np.isfinite(time) and time >= 0.0 for time in times):
+        raise InputError("lies before the beginning", key="time", value=min(times), expected="seconds ≥ 0")
