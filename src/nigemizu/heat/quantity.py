@@ -305,14 +305,20 @@ class Quantity(Value):
         assert course is not None  # the validator holds it
         return course.at(time)
 
-    def at(self, grid: Grid, time: float) -> np.ndarray:
-        """The values over the cells of the ground, (ny, nx) float64, at `time` [s]."""
-        result = np.full(grid.shape[1:], self.at_time(time))
+    def planes(self, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+        """Two planes over the cells of the ground, (ny, nx): value = first × `at_time` + second."""
+        zero, one = np.zeros(grid.shape[1:]), np.ones(grid.shape[1:])
         if self.patterns:
             x, y = np.meshgrid(grid.x, grid.y)
+            # a pattern replaces or adds: it is linear in what lies below it
             for pattern in self.patterns:
-                result = pattern.apply(result, x, y)
-        return result
+                zero, one = pattern.apply(zero, x, y), pattern.apply(one, x, y)
+        return np.rint(one - zero), zero
+
+    def at(self, grid: Grid, time: float) -> np.ndarray:
+        """The values over the cells of the ground, (ny, nx) float64, at `time` [s]."""
+        factor, summand = self.planes(grid)
+        return np.asarray(factor * self.at_time(time) + summand)
 
     @property
     def is_constant(self) -> bool:

@@ -1,0 +1,191 @@
+"""Compiled loops of the horizontal motion: transport by the wind, and diffusion along x and y.
+
+Every level of the air moves on its own: it has one wind and one pair of diffusivities, and it fits into the
+processor's cache, where all four passes are made before the next level is fetched.
+
+Symbols: `c` Courant number left after whole cells (0 ≤ c < 1), `U`, `C`, `D` the cells upwind, at, and
+downwind of a face's donor, `f` the value carried through the face.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+__all__ = ["move_levels"]
+
+PAD = 3  # cells of padding on each side: the donor before the first cell, and two more
+
+
+@njit(cache=True, nogil=True, inline="never")
+def _beyond(index, count, periodic, reflecting):  # type: ignore[no-untyped-def]
+    """The cell that stands for `index` outside 0..count-1: wrapped, mirrored, or the outermost one."""
+    if periodic:
+        return index % count
+    if reflecting:
+        index = index % (2 * count)
+        return index if index < count else 2 * count - 1 - index
+    return min(max(index, 0), count - 1)
+
+
+@njit(cache=True, nogil=True, inline="never")
+def _fill(source, padded, pad, shift, periodic, reflecting):  # type: ignore[no-untyped-def]
+    """Copy a row, moved by `shift` cells, with `pad` cells of what lies beyond on each side."""
+    count = source.size
+    first = min(max(pad + shift, 0), count + 2 * pad)  # padded[m] holds source[m - pad - shift]
+    last = min(max(first, pad + shift + count), count + 2 * pad)
+    for m in range(first):
+        padded[m] = source[_beyond(m - pad - shift, count, periodic, reflecting)]
+    for m in range(first, last):
+        padded[m] = source[m - pad - shift]
+    for m in range(last, count + 2 * pad):
+        padded[m] = source[_beyond(m - pad - shift, count, periodic, reflecting)]
+
+
+@njit(cache=True, nogil=True, inline="never")
+def _face_flux(a, b, C, d, e, w, c, flux):  # type: ignore[no-untyped-def]
+    """What leaves the donor cells `C` through their downwind face; `a`, `b` lie upwind, `d`, `e` downwind.
+
+    The value that a quintic through the running sum of the cells gives, limited so that the next value of
+    each cell lies between its old one and that of its upwind neighbour (Leonard 1991, for one constant
+    Courant number).
+    """
+    room = 1.0 / c - 1.0
+    for i in range(flux.size):
+        centre = C[i]
+        high = w[0] * a[i] + w[1] * b[i] + w[2] * centre + w[3] * d[i] + w[4] * e[i] - centre
+        down = d[i] - centre
+        up = (centre - b[i]) * room
+        highest = max(0.0, min(down, up))
+        lowest = min(0.0, max(down, up))
+        flux[i] = c * (centre + min(highest, max(lowest, high)))
+
+
+@njit(cache=True, nogil=True, inline="never")
+def _carry_x(source, target, shift, c, w, periodic, row, flux):  # type: ignore[no-untyped-def]
+    ny, nx = source.shape
+    for j in range(ny):
+        _fill(source[j], row, PAD, shift, periodic, False)
+        out = target[j]
+        if c == 0.0:
+            out[:] = row[PAD : PAD + nx]
+        else:
+            n = nx + 1  # faces, the first one on the left of cell 0
+            _face_flux(
+                row[:n], row[1 : n + 1], row[2 : n + 2], row[3 : n + 3], row[4 : n + 4], w, c, flux[:n]
+            )
+            for i in range(nx):
+                out[i] = row[i + PAD] - (flux[i + 1] - flux[i])
+
+
+@njit(cache=True, nogil=True, inline="never")
+def _carry_y(source, target, shift, c, w, periodic, before, after):  # type: ignore[no-untyped-def]
+    ny, nx = source.shape
+    for j in range(-1, ny):
+        rows = source[_beyond(j - shift, ny, periodic, False)]
+        if c > 0.0:
+            _face_flux(
+                source[_beyond(j - shift - 2, ny, periodic, False)],
+                source[_beyond(j - shift - 1, ny, periodic, False)],
+                rows,
+                source[_beyond(j - shift + 1, ny, periodic, False)],
+                source[_beyond(j - shift + 2, ny, periodic, False)],
+                w,
+                c,
+                after[:nx],
+            )
+        if j >= 0:
+            out = target[j]
+            if c > 0.0:
+                for i in range(nx):
+                    out[i] = rows[i] - (after[i] - before[i])
+            else:
+                out[:] = rows
+        before, after = after, before
+
+
+@njit(cache=True, nogil=True, inline="never")
+def _spread_x(source, target, half, weights, periodic, row):  # type: ignore[no-untyped-def]
+    ny, nx = source.shape
+    for j in range(ny):
+        _fill(source[j], row, half, 0, periodic, True)
+        out = target[j]
+        for i in range(nx):
+            out[i] = weights[0] * row[i + half]
+        for k in range(1, half + 1):
+            left, right, weight = row[half - k : half - k + nx], row[half + k : half + k + nx], weights[k]
+            for i in range(nx):
+                out[i] += weight * (left[i] + right[i])
+
+
+@njit(cache=True, nogil=True, inline="never")
+def _spread_y(source, target, half, weights, periodic):  # type: ignore[no-untyped-def]
+    ny, nx = source.shape
+    for j in range(ny):
+        out, middle = target[j], source[j]
+        for i in range(nx):
+            out[i] = weights[0] * middle[i]
+        for k in range(1, half + 1):
+            left = source[_beyond(j - k, ny, periodic, True)]
+            right = source[_beyond(j + k, ny, periodic, True)]
+            weight = weights[k]
+            for i in range(nx):
+                out[i] += weight * (left[i] + right[i])
+
+
+@njit(cache=True, nogil=True)
+def move_levels(  # type: ignore[no-untyped-def]
+    air, first, stride, y_first, shifts, parts, carry_weights, halves, spread_weights, periodic
+):
+    """Move the levels ``first, first + stride, …`` of `air` in place.
+
+    Parameters
+    ----------
+    air : (nz, ny, nx) float64, K
+    first, stride : int
+        Which levels.
+    y_first : bool
+        Whether y comes before x.
+    shifts : (2, nz) int64
+        Whole cells by which a level is carried along x and y.
+    parts : (2, nz) float64
+        Courant numbers that are left, 0 ≤ c < 1.
+    carry_weights : (2, nz, 5) float64
+        Weights of the cells about the donor for the value carried through a face.
+    halves : (2, nz) int64
+        Half-widths of the kernels of diffusion; 0 leaves the level alone.
+    spread_weights : (2, nz, widest + 1) float64
+        Kernels of diffusion, from the centre outwards.
+    periodic : (2,) bool
+        Periodic (True) or insulated along x and y.
+    """
+    nz, ny, nx = air.shape
+    widest = max(PAD, spread_weights.shape[2] - 1)
+    level = np.empty((ny, nx))
+    row = np.empty(nx + 2 * widest)
+    before, after = np.empty(nx + 1), np.empty(nx + 1)
+    for k in range(first, nz, stride):
+        source, target = air[k], level
+        moved = False
+        for axis in range(2):
+            along = 1 - axis if y_first else axis
+            shift, c = shifts[along, k], parts[along, k]
+            if shift == 0 and c == 0.0:
+                continue
+            if along == 0:
+                _carry_x(source, target, shift, c, carry_weights[0, k], periodic[0], row, before)
+            else:
+                _carry_y(source, target, shift, c, carry_weights[1, k], periodic[1], before, after)
+            source, target, moved = target, source, not moved
+        for axis in range(2):
+            along = 1 - axis if y_first else axis
+            half = halves[along, k]
+            if half == 0:
+                continue
+            if along == 0:
+                _spread_x(source, target, half, spread_weights[0, k], periodic[0], row)
+            else:
+                _spread_y(source, target, half, spread_weights[1, k], periodic[1])
+            source, target, moved = target, source, not moved
+        if moved:
+            target[:] = source
