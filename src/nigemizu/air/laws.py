@@ -104,7 +104,14 @@ def refractivity(
     water, water_is_fraction = _water(relative_humidity, vapour_fraction)
 
     operands = [temperature, pressure, dry, wet, water]
-    output = np.empty(np.broadcast_shapes(*(operand.shape for operand in operands)))
+    shapes = [operand.shape for operand in operands]
+    try:
+        output = np.empty(np.broadcast_shapes(*shapes))
+    except ValueError as error:
+        raise InputError(
+            f"shapes do not fit: temperature {shapes[0]}, pressure {shapes[1]}, moisture {shapes[-1]}",
+            key="temperature",
+        ) from error
     blocks = np.nditer(
         [*operands, output],
         flags=["external_loop", "buffered", "zerosize_ok"],
