@@ -62,10 +62,6 @@ class Field(ABC):
             never meets the region
         """
 
-    @abstractmethod
-    def exit(self, origin: Any, direction: Any) -> Any:
-        """Distance at which a straight line from inside leaves the region (Float; infinity if never)."""
-
 
 class UnboundedField(Field):
     """A field that fills all space."""
@@ -75,9 +71,6 @@ class UnboundedField(Field):
 
     def entry(self, origin: Any, direction: Any) -> Any:
         return self.types.Float(0)
-
-    def exit(self, origin: Any, direction: Any) -> Any:
-        return self.types.Float(dr.inf)
 
 
 class BoxedField(Field):
@@ -111,9 +104,6 @@ class BoxedField(Field):
         near, far = self._slabs(origin, direction)
         near = dr.maximum(near, 0)
         return dr.select(near <= far, near, dr.inf)
-
-    def exit(self, origin: Any, direction: Any) -> Any:
-        return dr.maximum(self._slabs(origin, direction)[1], 0)
 
     def _slabs(self, origin: Any, direction: Any) -> tuple[Any, Any]:
         """Where the line enters and leaves the box; near > far where it misses."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, final
+from typing import Any, Final, final
 
 import drjit as dr
 
-__all__ = ["RayEnd", "RayStatus"]
+__all__ = ["ESCAPED", "HIT", "NOT_TRACED", "OUT_OF_STEPS", "STOPPED", "RayEnd", "RayStatus"]
 
 
 @final
@@ -40,6 +40,13 @@ _MESSAGES = {
     RayStatus.STOPPED: "the ray went the whole distance that was asked for",
 }
 
+# The same as plain numbers, for comparison with status arrays.
+NOT_TRACED: Final = int(RayStatus.NOT_TRACED)
+HIT: Final = int(RayStatus.HIT)
+ESCAPED: Final = int(RayStatus.ESCAPED)
+OUT_OF_STEPS: Final = int(RayStatus.OUT_OF_STEPS)
+STOPPED: Final = int(RayStatus.STOPPED)
+
 
 @final
 @dataclass
@@ -60,6 +67,8 @@ class RayEnd:
         intersection of this one piece finds it again.
     chord_length : Float, m
         Its length; infinite beyond the volume.
+    chord_start : Float, m
+        Length of the path before it.
     steps : UInt32
         Integration steps made (layers: boundaries met).
     path_length : Float, m
@@ -77,6 +86,7 @@ class RayEnd:
     chord_origin: Any
     chord_direction: Any
     chord_length: Any
+    chord_start: Any
     steps: Any
     path_length: Any
     optical_path: Any = None
@@ -85,18 +95,18 @@ class RayEnd:
     @property
     def hit(self) -> Any:
         """Whether the ray met a surface (Bool)."""
-        return self.status == int(RayStatus.HIT)
+        return self.status == HIT
 
     @property
     def escaped(self) -> Any:
         """Whether the ray left the volume and met nothing (Bool)."""
-        return self.status == int(RayStatus.ESCAPED)
+        return self.status == ESCAPED
 
 
 def choose_status(types: Any, active: Any, hit: Any, escaped: Any, stopped: Any) -> Any:
     """The status array (UInt32) from masks; what is in none of them has run out of steps."""
     UInt32 = types.UInt32
-    status = dr.select(stopped, UInt32(int(RayStatus.STOPPED)), UInt32(int(RayStatus.OUT_OF_STEPS)))
-    status = dr.select(escaped, UInt32(int(RayStatus.ESCAPED)), status)
-    status = dr.select(hit, UInt32(int(RayStatus.HIT)), status)
-    return dr.select(active, status, UInt32(int(RayStatus.NOT_TRACED)))
+    status = dr.select(stopped, UInt32(STOPPED), UInt32(OUT_OF_STEPS))
+    status = dr.select(escaped, UInt32(ESCAPED), status)
+    status = dr.select(hit, UInt32(HIT), status)
+    return dr.select(active, status, UInt32(NOT_TRACED))

@@ -15,6 +15,7 @@ from nigemizu.trace.surfaces import Surface
 
 __all__ = ["march"]
 
+_ROUNDING: Final = {"single": 4 * 2.0**-23, "double": 4 * 2.0**-52}
 NEAREST: Final = 1.0  # m; nearer to the eye than this the chord tolerance grows no finer
 
 
@@ -44,11 +45,11 @@ def march(
     origin: Any,
     direction: Any,
     *,
-    step: float,
-    max_steps: int,
+    step: Any,
+    max_steps: Any,
     stepper: Stepper = LEAPFROG,
     surface: Surface | None = None,
-    chord_tolerance: float | None = None,
+    chord_tolerance: Any = None,
     max_chord_steps: int = 32,
     max_distance: Any = None,
     details: bool = False,
@@ -61,15 +62,15 @@ def march(
     field : Field
     origin : Array3f, m
     direction : Array3f, 1 — unit length
-    step : float, m
+    step : float or Float, m
         Interval along the ray between turns. It is exact where the index is that at the ray's first
         point in the volume, and n/n₀ times as long elsewhere.
-    max_steps : int
+    max_steps : int or UInt32
         Most intervals that a ray may use.
     stepper : Stepper
     surface : callable, optional
         ``surface(origin, direction, length, active) -> (hit, distance)``.
-    chord_tolerance : float, optional, rad
+    chord_tolerance : float or Float, optional, rad
         How far a tested chord may lie from the bent ray, as an angle seen from the ray's origin (a
         fraction of a pixel). None tests after every step.
     max_chord_steps : int
@@ -131,11 +132,11 @@ def march(
     march_step = _MarchStep(
         field=field,
         stepper=stepper,
-        sigma=step / n,
-        step=step,
-        max_steps=max_steps,
+        sigma=Float(step) / n,
+        step=Float(step),
+        max_steps=UInt32(max_steps),
         limit=None if max_distance is None else limit,
-        tolerance=chord_tolerance,
+        tolerance=None if chord_tolerance is None else Float(chord_tolerance),
         max_chord_steps=max_chord_steps if chord_tolerance is not None else 1,
         details=details,
     )
@@ -168,6 +169,7 @@ def march(
         chord_origin=chord.origin,
         chord_direction=chord.direction,
         chord_length=chord.length,
+        chord_start=chord.start,
         steps=flight.steps,
         path_length=path,
         optical_path=dr.fma(n, path - flight.path, flight.optical) if details else None,
@@ -184,10 +186,10 @@ class _MarchStep:
         field: Field,
         stepper: Stepper,
         sigma: Any,
-        step: float,
-        max_steps: int,
+        step: Any,
+        max_steps: Any,
         limit: Any,
-        tolerance: float | None,
+        tolerance: Any,
         max_chord_steps: int,
         details: bool,
     ) -> None:
@@ -205,7 +207,7 @@ class _MarchStep:
         """The state after one more interval."""
         sigma = self.sigma
         if self.limit is not None:
-            sigma = sigma * dr.minimum(1, (self.limit - flight.path) * (1 / self.step))
+            sigma = sigma * dr.minimum(1, (self.limit - flight.path) * dr.rcp(self.step))
         after = self.stepper.advance(self.field, flight.position, flight.momentum, sigma, active)
         turning = flight.turning
         if self.details:
@@ -233,7 +235,7 @@ class _MarchStep:
         types = self.field.types
         if self.limit is None:
             return types.Bool(False)
-        return flight.path >= self.limit * (1 - 4 * dr.epsilon(types.Float))
+        return flight.path >= self.limit * (1 - _ROUNDING[types.precision])
 
     def chord_holds(self, flight: _Flight, chord_start: Any) -> Any:
         """Whether one more step like the last one may share the chord that began at `chord_start`."""

@@ -7,6 +7,7 @@ a and b.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any, Final, final
 
@@ -99,7 +100,7 @@ class Stepper:
 def _composed(name: str, order: int, parts: tuple[float, ...]) -> Stepper:
     """Leapfrogs of the given relative lengths, one after another, neighbouring drifts joined."""
     drifts = [parts[0] / 2]
-    drifts += [(one + two) / 2 for one, two in zip(parts[:-1], parts[1:], strict=True)]
+    drifts += [(one + two) / 2 for one, two in itertools.pairwise(parts)]
     drifts += [parts[-1] / 2]
     return Stepper(name, order, tuple(drifts), parts)
 
