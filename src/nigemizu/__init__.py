@@ -15,7 +15,6 @@ libraries under them are loaded when they are first used.
 from __future__ import annotations
 
 import importlib
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from nigemizu.errors import InputError, MachineError, NigemizuError, NigemizuWarning
@@ -40,7 +39,7 @@ _FROM_SCENE = ("Scene", "builtin_scenes", "load")
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        return version("nigemizu")
+        return importlib.import_module("importlib.metadata").version("nigemizu")
     if name in _ROOMS:
         return importlib.import_module(f"nigemizu.{name}")
     if name in _FROM_SCENE:

@@ -314,9 +314,9 @@ class Scene(Value):
         RenderedPicture
             Its ``pixels`` are linear light; ``save("x.png")`` and ``save("x.exr")`` write it.
         """
-        from nigemizu.scene import running
+        from nigemizu.scene import rendering
 
-        return running.render(self._seen(method, samples), time, air, variant, progress)
+        return rendering.render(self._seen(method, samples), time, air, variant, progress)
 
     def animate(
         self,

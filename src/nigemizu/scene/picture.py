@@ -1,0 +1,45 @@
+"""A picture with the scene that it shows."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from nigemizu.scene.model import Scene
+
+__all__ = ["RenderedPicture"]
+
+
+@final
+@dataclass(frozen=True)
+class RenderedPicture:
+    """A rendered picture.
+
+    Attributes
+    ----------
+    pixels : (height, width, 3) float32
+        Linear red, green, blue, the camera's exposure included; row 0 is the top.
+    statuses : dict of str to int
+        Number of camera rays that ended as ``hit``, ``escaped`` and ``out-of-steps``.
+    scene : Scene
+        What was rendered.
+    """
+
+    pixels: NDArray[np.float32]
+    statuses: dict[str, int]
+    scene: Scene
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write ``.png`` (8 bits, sRGB) or ``.exr`` (linear), whole or not at all, and return where it is.
+
+        The scene is embedded, so that the picture can be made again.
+        """
+        from nigemizu.output import write_picture
+
+        return write_picture(self.pixels, Path(path), scene=self.scene.to_toml())
