@@ -6,6 +6,9 @@ that render import it when they are first used.
 
 from __future__ import annotations
 
+import importlib
+from typing import TYPE_CHECKING, Any, Final
+
 from nigemizu.render.camera import Camera
 from nigemizu.render.light import Light
 from nigemizu.render.materials import Asphalt, Checker, Colour, Masonry, Material, Sand, Texture
@@ -23,12 +26,21 @@ from nigemizu.render.objects import (
     Vehicle,
 )
 
+if TYPE_CHECKING:
+    from nigemizu.render.assembly import build
+    from nigemizu.render.bending import Frame, medium_of, surface_query
+    from nigemizu.render.passes import Picture, picture
+    from nigemizu.render.path_tracer import integrator
+    from nigemizu.render.settings import Settings
+    from nigemizu.render.variant import register, select_variant
+
 __all__ = [
     "Asphalt",
     "Box",
     "Camera",
     "Checker",
     "Colour",
+    "Frame",
     "Ground",
     "Hills",
     "Light",
@@ -37,11 +49,42 @@ __all__ = [
     "Mesh",
     "MitsubaFile",
     "Object",
+    "Picture",
     "Pole",
     "Pyramid",
     "Road",
     "Sand",
+    "Settings",
     "Sphere",
     "Texture",
     "Vehicle",
+    "build",
+    "integrator",
+    "medium_of",
+    "picture",
+    "register",
+    "select_variant",
+    "surface_query",
 ]
+
+# Loaded when first used: these modules import Mitsuba.
+_NEEDS_MITSUBA: Final = {
+    "Frame": "bending",
+    "Picture": "passes",
+    "Settings": "settings",
+    "build": "assembly",
+    "integrator": "path_tracer",
+    "medium_of": "bending",
+    "picture": "passes",
+    "register": "variant",
+    "select_variant": "variant",
+    "surface_query": "bending",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _NEEDS_MITSUBA:
+        module = importlib.import_module(f"nigemizu.render.{_NEEDS_MITSUBA[name]}")
+        found = globals()[name] = getattr(module, name)
+        return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -172,12 +172,11 @@ def _ground_bsdf(material: Material, road: Road | None, key: str, camera: Camera
         if road is not None:
             raise InputError("a road goes on sand, asphalt or a plain colour", key=key, value=material.kind)
         return _bsdf(material, key, camera, ((0.0, 0.0, 0.0), 0.0))
-    even = isinstance(material, Colour)
     texture = {
         **_seen("nigemizu_ground", camera),
         "colour": mi.ScalarColor3f(list(material.colour)),
-        "contrast": 0.0 if even else material.contrast,
-        "seed": 0 if even else material.seed,
+        "contrast": 0.0 if isinstance(material, Colour) else material.contrast,
+        "seed": 0 if isinstance(material, Colour) else material.seed,
         "scale": material.scale if isinstance(material, Sand) else 9.0,
     }
     if road is not None:
@@ -282,11 +281,11 @@ def _mesh(triangles: meshes.Triangles, bsdf: dict[str, Any], **extra: Any) -> An
 
 
 def _pole(item: Pole) -> dict[str, Any]:
-    foot, band = np.asarray(item.position), item.height / item.bands
+    (x, y, z), band = item.position, item.height / item.bands
     shapes = {}
     for index in range(item.bands):
-        start = foot + [0.0, 0.0, index * band]
-        triangles = meshes.cylinder(start, start + [0.0, 0.0, band], item.diameter / 2)
+        start, end = np.array([x, y, z + index * band]), np.array([x, y, z + (index + 1) * band])
+        triangles = meshes.cylinder(start, end, item.diameter / 2)
         shapes[f"band{index}"] = _mesh(triangles, _matt(item.colours[index % 2]))
     return shapes
 

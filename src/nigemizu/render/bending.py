@@ -17,7 +17,7 @@ from nigemizu.errors import InputError
 from nigemizu.render.settings import Settings
 from nigemizu.render.variant import current_backend
 
-__all__ = ["AirResolver", "Bending", "Frame", "field_from_air", "surface_query"]
+__all__ = ["AirResolver", "Bending", "Frame", "field_from_air", "medium_of", "surface_query"]
 
 Axes = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 AirResolver = Callable[[str, float], Axes]
@@ -83,27 +83,28 @@ class Bending:
 
     Parameters
     ----------
-    method : str
-        ``bent``, ``straight`` or ``layered``.
     medium : Field or Layers or None
-        What the light passes; None with ``straight``.
-    settings : Settings
-        Step and limits.
+        What the light passes; None leaves it straight.
+    tracer : Tracer
+        How it passes.
     frame : Frame
         Where the air stands.
     """
 
-    def __init__(self, method: str, medium: Any, settings: Settings, frame: Frame) -> None:
-
-        if method != "straight" and medium is None:
-            raise InputError("there is no air to bend light", key="method", value=method)
-        self.method = method
+    def __init__(self, medium: Any, tracer: trace.Tracer, frame: Frame) -> None:
+        self.method = tracer.method if medium is not None else "straight"
         self.medium = medium
         self.frame = frame
+        self.stepper = trace.stepper_named(tracer.stepper)
+        self.tolerance = tracer.chord_tolerance
         # Opaque: values of the next frame reuse the compiled kernel.
-        self.step = dr.opaque(mi.Float, settings.step)
-        self.max_steps = dr.opaque(mi.UInt32, settings.max_steps)
-        self.chord_tolerance = dr.opaque(mi.Float, settings.chord_tolerance)
+        self.step = dr.opaque(mi.Float, tracer.step)
+        self.max_steps = dr.opaque(mi.UInt32, tracer.max_steps)
+        self.set_pixel_angle(1e-4)
+
+    def set_pixel_angle(self, angle: float) -> None:
+        """Say how large a pixel is, rad."""
+        self.chord_tolerance = dr.opaque(mi.Float, self.tolerance * angle)
 
     def advance(self, scene: Any, ray: Any, active: Any) -> tuple[Any, Any, Any]:
         """Follow `ray` to where it hits, escapes or has used its steps.
@@ -126,7 +127,7 @@ class Bending:
         origin, direction = _to_air(ray.o, ray.d, frame)
         if self.method == "layered":
             end = trace.cross_layers(
-                self.medium, origin, direction, max_steps=self.max_steps, surface=surface, active=active
+                self.medium, origin, direction, max_crossings=self.max_steps, surface=surface, active=active
             )
         else:
             end = trace.march(
@@ -135,11 +136,12 @@ class Bending:
                 direction,
                 step=self.step,
                 max_steps=self.max_steps,
+                stepper=self.stepper,
                 surface=surface,
                 chord_tolerance=self.chord_tolerance,
                 active=active,
             )
-        last = mi.Ray3f(ray)
+        last: Any = mi.Ray3f(ray)
         last.o, last.d = _to_scene(
             dr.select(end.hit, end.chord_origin, end.position),
             dr.select(end.hit, end.chord_direction, end.direction),
@@ -167,10 +169,11 @@ def surface_query(scene: Any) -> Callable[[Any, Any, Any, Any], tuple[Any, Any]]
     """
 
     def surface(origin: Any, direction: Any, length: Any, active: Any) -> tuple[Any, Any]:
-        ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
+        ray: Any = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
         ray.maxt = mi.Float(length)
         met = scene.ray_intersect_preliminary(ray, True, mi.Bool(active))
-        return met.is_valid(), type(length)(met.t)
+        # In the array types of the caller.
+        return dr.mask_t(length)(met.is_valid()), type(length)(met.t)
 
     return surface
 
@@ -198,8 +201,41 @@ def field_from_air(settings: Settings, resolve_air: AirResolver | None) -> Any:
             "no such air dataset", key="integrator nigemizu: air", value=name,
             expected="a path that ends in .nc or .zarr",
         )  # fmt: skip
-    types = field.types(current_backend(), precision="single", differentiable=True)
-    return field.TrilinearVolume(*axes, types=types, beyond=settings.beyond)
+    return medium_of(*axes, tracer=settings.tracer)
+
+
+def medium_of(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    z: NDArray[np.float64],
+    refractivity: NDArray[np.float64],
+    *,
+    tracer: trace.Tracer,
+) -> Any:
+    """Air on a grid as what the tracer's method wants: a volume, or panes cut from its mean profile.
+
+    Parameters
+    ----------
+    x, y, z : (nx,), (ny,), (nz,) float64, m
+        Axes, as from `nigemizu.heat.refractivity_at`.
+    refractivity : (nz, ny, nx) float64, 1
+        n − 1.
+    tracer : Tracer
+        Method, what lies beyond the sides, and the panes.
+    """
+    types = field.types(current_backend(), "single", differentiable=True)
+    if tracer.method == "layered":
+        return field.Layers.from_profile(
+            z,
+            refractivity.mean(axis=(1, 2)),
+            tracer.layers,
+            types,
+            spacing=tracer.layer_spacing,
+            waviness_amplitude=tracer.waviness_amplitude,
+            waviness_length=tracer.waviness_length,
+            waviness_seed=tracer.waviness_seed,
+        )
+    return field.TrilinearVolume(x, y, z, refractivity, types, beyond=tracer.beyond)
 
 
 def _to_air(origin: Any, direction: Any, frame: Frame) -> tuple[Any, Any]:
@@ -218,7 +254,7 @@ def _to_scene(origin: Any, direction: Any, frame: Frame) -> tuple[Any, Any]:
         return origin, direction
     rotation = mi.Matrix3f(frame.rotation.tolist())
     turned = rotation @ (mi.Vector3f(origin) * frame.scale)
-    return mi.Point3f(turned) + mi.Vector3f(frame.origin.tolist()), rotation @ direction
+    return mi.Point3f(turned + mi.Vector3f(frame.origin.tolist())), rotation @ direction
 
 
 def _in_frame(surface: Callable[..., tuple[Any, Any]], frame: Frame) -> Callable[..., tuple[Any, Any]]:

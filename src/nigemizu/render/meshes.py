@@ -47,7 +47,7 @@ def box(size: tuple[float, float, float]) -> Triangles:
     """A box on z = 0, centred in x and y."""
     x, y, z = size[0] / 2, size[1] / 2, size[2]
     bottom = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]], dtype=np.float64)
-    return loft(np.stack([bottom, bottom + [0, 0, z]]))
+    return loft(np.stack([bottom, bottom + np.array([0, 0, z])]))
 
 
 def loft(loops: NDArray[np.float64], smooth: bool = False) -> Triangles:
@@ -77,7 +77,7 @@ def loft(loops: NDArray[np.float64], smooth: bool = False) -> Triangles:
 
 def quad_strip(rows: NDArray[np.float64], smooth: bool = False) -> Triangles:
     """An open surface through rows of points (L, N, 3)."""
-    return Triangles(rows.reshape(-1, 3), _grid_faces(*rows.shape[:2], closed=False), smooth)
+    return Triangles(rows.reshape(-1, 3), _grid_faces(rows.shape[0], rows.shape[1], closed=False), smooth)
 
 
 def cylinder(start: Vertices, end: Vertices, radius: float, around: int = 32) -> Triangles:

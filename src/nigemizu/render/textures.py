@@ -35,17 +35,18 @@ def noise_tile(seed: int) -> NDArray[np.float32]:
 def texture_classes(variant: str) -> dict[str, Any]:
     """Plug-in name → class, under `variant`, which must be the one in use."""
 
-    class Procedural(mi.Texture):  # type: ignore[misc]
+    class Procedural(mi.Texture):
         """A pattern in scene coordinates, seen from `eye` with pixels of `pixel_angle` radians."""
 
         def __init__(self, props: Any) -> None:
             super().__init__(props)
-            self.eye = dr.opaque(mi.Point3f, mi.Point3f(props.get("eye", mi.ScalarPoint3f(0))))
+            self.eye = _opaque(mi.Point3f(props.get("eye", mi.ScalarPoint3f(0))))
             self.pixel_angle = dr.opaque(mi.Float, props.get("pixel_angle", 1e-3))
-            self.colour = dr.opaque(mi.Color3f, mi.Color3f(props["colour"]))
+            self.colour = _opaque(mi.Color3f(props["colour"]))
             self.contrast = dr.opaque(mi.Float, props.get("contrast", 0.0))
-            tile = noise_tile(int(props.get("seed", 0)))
-            self.tile = mi.Texture2f(mi.TensorXf(tile[..., None]), wrap_mode=dr.WrapMode.Repeat)
+            tile = mi.TensorXf(noise_tile(props.get("seed", 0))[..., None])
+            texture: Any = mi.Texture2f
+            self.tile = texture(tile, wrap_mode=dr.WrapMode.Repeat)
 
         def footprint(self, si: Any) -> tuple[Any, Any, Any]:
             """Width of a pixel on the surface across the line of sight, and its extents along x and y."""
@@ -141,7 +142,7 @@ def texture_classes(variant: str) -> dict[str, Any]:
 
         def __init__(self, props: Any) -> None:
             super().__init__(props)
-            self.other = dr.opaque(mi.Color3f, mi.Color3f(props["other"]))
+            self.other = _opaque(mi.Color3f(props["other"]))
             self.size = float(props["size"])
 
         def pattern(self, si: Any) -> Any:
@@ -184,6 +185,12 @@ def texture_classes(variant: str) -> dict[str, Any]:
             return self.tile.eval(u - dr.floor(u))[0]
 
     return {"nigemizu_ground": Ground, "nigemizu_checker": Checker, "nigemizu_masonry": Masonry}
+
+
+def _opaque(value: Any) -> Any:
+    """A value that the kernel reads instead of having it compiled in."""
+    dr.make_opaque(value)
+    return value
 
 
 def _strip(y: Any, lower: Any, upper: Any, width: Any) -> Any:

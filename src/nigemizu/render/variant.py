@@ -84,17 +84,17 @@ def register(resolve_air: AirResolver | None = None) -> None:
         axes, ``(name, time) -> (x, y, z, refractivity)`` with ``refractivity[z, y, x]``.
     """
 
-    from nigemizu.render.integrator import integrator_class
+    from nigemizu.render.path_tracer import integrator_class
 
     variant = select_variant("auto")
     make: Callable[[Any], Any] = functools.partial(integrator_class(variant), resolve_air=resolve_air)
     mi.register_integrator("nigemizu", make)
 
 
-def current_backend() -> str:
+def current_backend() -> Literal["llvm", "cuda"]:
     """``"llvm"`` or ``"cuda"``: the backend of the variant in use."""
 
-    return str(mi.variant()).split("_", 1)[0]
+    return "cuda" if mi.variant() == _VARIANTS["cuda"] else "llvm"
 
 
 @functools.cache

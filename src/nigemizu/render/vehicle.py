@@ -15,7 +15,8 @@ LENGTH = 4.4  # m, from bumper to bumper of the car below
 
 # x, half width, bottom, top of the body below the windows, from the tail to the nose (m)
 _BODY = np.array([
-    [-2.20, 0.74, 0.38, 0.82], [-2.16, 0.80, 0.28, 0.93], [-1.90, 0.86, 0.22, 0.98], [-1.20, 0.89, 0.20, 0.97],
+    [-2.20, 0.74, 0.38, 0.82], [-2.16, 0.80, 0.28, 0.93],
+    [-1.90, 0.86, 0.22, 0.98], [-1.20, 0.89, 0.20, 0.97],
     [0.00, 0.89, 0.19, 0.95], [0.90, 0.89, 0.20, 0.95], [1.40, 0.88, 0.21, 0.90], [1.85, 0.85, 0.22, 0.80],
     [2.08, 0.80, 0.24, 0.73], [2.20, 0.70, 0.30, 0.62],
 ])  # fmt: skip
@@ -25,8 +26,11 @@ _CABIN = np.array([
     [1.25, -1.50, 0.50, 0.69], [1.36, -1.30, 0.27, 0.64],
 ])  # fmt: skip
 _ROOF = np.array([
-    [1.36, -1.31, 0.28, 0.645], [1.41, -1.20, 0.16, 0.61], [1.445, -1.00, 0.00, 0.54], [1.46, -0.7, -0.25, 0.40],
+    [1.36, -1.31, 0.28, 0.645], [1.41, -1.20, 0.16, 0.61], [1.445, -1.00, 0.00, 0.54],
+    [1.46, -0.7, -0.25, 0.40],
 ])  # fmt: skip
+# (x, y) of each pillar at the belt line and at the roof, a finger in front of the glass (m)
+_PILLARS = (((1.06, 0.79), (0.26, 0.645)), ((-0.35, 0.80), (-0.42, 0.65)), ((-1.86, 0.78), (-1.28, 0.64)))
 
 
 def car() -> dict[str, list[Triangles]]:
@@ -57,7 +61,7 @@ def car() -> dict[str, list[Triangles]]:
         for x in (-1.33, 1.37):
             outer, inner = np.array([x, 0.87 * side, 0.32]), np.array([x, 0.64 * side, 0.32])
             parts["rubber"].append(cylinder(inner, outer, 0.32))
-            parts["metal"].append(cylinder(outer, outer + [0, 0.012 * side, 0], 0.2))
+            parts["metal"].append(cylinder(outer, outer + np.array([0, 0.012 * side, 0]), 0.2))
             arch = np.array([x, 0.60 * side, 0.34]), np.array([x, 0.885 * side, 0.34])
             parts["dark"].append(cylinder(*arch, 0.37))
         parts["lamp"].append(ellipsoid((2.06, 0.62 * side, 0.66), (0.11, 0.17, 0.07)))

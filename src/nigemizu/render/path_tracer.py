@@ -23,34 +23,41 @@ KOSCHMIEDER: Final = 3.912
 """−ln 0.02: the optical thickness through which 2 % of the contrast is left."""
 
 
-def integrator(medium: Any = None, frame: Frame | None = None, **settings: Any) -> Any:
+def integrator(
+    medium: Any = None,
+    settings: Settings | None = None,
+    *,
+    frame: Frame | None = None,
+) -> Any:
     """An integrator over air that is already on the device, to put into a Mitsuba dictionary.
 
     Parameters
     ----------
     medium : Field or Layers, optional
-        The air; None renders straight rays.
+        The air, in single precision with differentiable array types
+        (``field.types(backend, differentiable=True)``); None renders straight rays.
+    settings : Settings, optional
+        How to follow light; its `air` and `time` are not used.
     frame : Frame, optional
         Where the air stands in the scene; default: the scene's own axes, metres, z up.
-    **settings
-        Properties of `Settings`.
 
     Returns
     -------
     mi.SamplingIntegrator
-        Usable as ``{"type": "scene", "integrator": integrator(field), ...}``.
+        Usable as ``{"type": "scene", "integrator": integrator(field), ...}``. Its ``set_medium`` exchanges
+        the air between frames, ``counts`` holds the number of camera rays per entry of `STATUSES`.
     """
     from nigemizu.render.variant import select_variant
 
     cls = integrator_class(select_variant("auto"))
-    return cls(None, settings=read_settings(settings), medium=medium, frame=frame)
+    return cls(None, settings=settings or Settings(), medium=medium, frame=frame)
 
 
 @functools.cache
 def integrator_class(variant: str) -> Any:
     """The integrator's class under `variant`, which must be the one in use."""
 
-    class NigemizuIntegrator(mi.SamplingIntegrator):  # type: ignore[misc]
+    class NigemizuIntegrator(mi.SamplingIntegrator):
         """Path tracer with emitter sampling whose camera and scattered segments are bent by air.
 
         Symbols: β throughput, L radiance, η relative index of refraction so far, s path length.
@@ -71,18 +78,26 @@ def integrator_class(variant: str) -> Any:
             super().__init__(props if props is not None else mi.Properties("nigemizu"))
             if settings is None:
                 settings, frame = _settings_of(props)
-                if settings.air is not None and settings.method != "straight":
+                if settings.air is not None and settings.tracer.method != "straight":
                     medium = field_from_air(settings, resolve_air)
             self.settings = settings
             self.frame = frame or Frame(np.eye(3), 1.0, np.zeros(3))
+            visibility = settings.visibility
+            self.extinction = 0.0 if visibility is None else KOSCHMIEDER / (visibility * self.frame.scale)
             self.limit_depth = 2**32 - 1 if settings.max_depth < 0 else settings.max_depth
             self.reset_counts()
             self.set_medium(medium)
 
         def set_medium(self, medium: Any) -> None:
             """Put other air in; of the same kind and shape it reuses the compiled kernel."""
-            method = self.settings.method if medium is not None else "straight"
-            self.bending = Bending(method, medium, self.settings, self.frame)
+            self.bending = Bending(medium, self.settings.tracer, self.frame)
+
+        def render(self, scene: Any, sensor: Any = 0, *args: Any, **options: Any) -> Any:
+            """Render (the interface of `mi.Integrator`); measures a pixel for the chord tolerance first."""
+            if isinstance(sensor, int):
+                sensor = scene.sensors()[sensor]
+            self.bending.set_pixel_angle(pixel_angle(sensor))
+            return super().render(scene, sensor, *args, **options)
 
         def reset_counts(self) -> None:
             """Set the counters of camera rays per status to zero."""
@@ -98,7 +113,7 @@ def integrator_class(variant: str) -> Any:
             active = mi.Bool(active)
             depth = mi.UInt32(0)
             L = mi.Spectrum(0)
-            β = mi.Spectrum(1)
+            β: Any = mi.Spectrum(1)
             η = mi.Float(1)
             valid = mi.Bool(False)
             first = mi.Bool(True)
@@ -120,8 +135,8 @@ def integrator_class(variant: str) -> Any:
                 first = mi.Bool(False)
 
                 # ---------------------- haze between eye and surface ----------------------
-                if dr.hint(self.settings.visibility is not None, mode="scalar"):
-                    clear = dr.exp(-KOSCHMIEDER / self.settings.visibility / self.frame.scale * s)
+                if dr.hint(self.extinction > 0, mode="scalar"):
+                    clear = dr.exp(-self.extinction * s)
                     seen = active & si.is_valid()
                     L[seen] += β * (1 - clear) * self.horizon_radiance(scene, ray, seen)
                     β[seen] *= clear
@@ -203,6 +218,14 @@ def integrator_class(variant: str) -> Any:
 
     assert mi.variant() == variant
     return NigemizuIntegrator
+
+
+def pixel_angle(sensor: Any) -> float:
+    """Angle between the rays through two neighbouring pixels in the middle of the picture, rad."""
+    ray, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(0.5), mi.Point2f(0.5))
+    sine = dr.norm(dr.cross(ray.d, dr.normalize(ray.d_x)))
+    # An orthographic sensor has parallel rays; any small angle does.
+    return max(float(sine[0]), 1e-7)
 
 
 def _balance(pdf_a: Any, pdf_b: Any) -> Any:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from nigemizu.errors import InputError
 from nigemizu.progress import SILENT, ProgressMeter
-from nigemizu.render.integrator import STATUSES
+from nigemizu.render.path_tracer import STATUSES
 
 __all__ = ["Picture", "picture"]
 
