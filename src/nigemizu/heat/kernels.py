@@ -1,7 +1,8 @@
-"""Compiled loops of the horizontal motion: transport by the wind, and diffusion along x and y.
+"""Compiled loops: transport by the wind and diffusion along x and y; diffusion of columns along z.
 
-Every level of the air moves on its own: it has one wind and one pair of diffusivities, and it fits into the
-processor's cache, where all four passes are made before the next level is fetched.
+In the horizontal every level of the air moves on its own: it has one wind and one pair of diffusivities,
+and it fits into the processor's cache, where all four passes are made before the next level is fetched.
+Plain loops only: a slice assigned to a slice would make the first compilation twice as long.
 
 Symbols: `c` Courant number left after whole cells (0 ≤ c < 1), `U`, `C`, `D` the cells upwind, at, and
 downwind of a face's donor, `f` the value carried through the face.
@@ -12,12 +13,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["move_levels"]
+__all__ = ["move_levels", "spread_columns"]
 
 PAD = 3  # cells of padding on each side: the donor before the first cell, and two more
 
 
-@njit(cache=True, nogil=True, inline="never")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _beyond(index, count, periodic, reflecting):  # type: ignore[no-untyped-def]
     """The cell that stands for `index` outside 0..count-1: wrapped, mirrored, or the outermost one."""
     if periodic:
@@ -28,7 +29,7 @@ def _beyond(index, count, periodic, reflecting):  # type: ignore[no-untyped-def]
     return min(max(index, 0), count - 1)
 
 
-@njit(cache=True, nogil=True, inline="never")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill(source, padded, pad, shift, periodic, reflecting):  # type: ignore[no-untyped-def]
     """Copy a row, moved by `shift` cells, with `pad` cells of what lies beyond on each side."""
     count = source.size
@@ -42,7 +43,7 @@ def _fill(source, padded, pad, shift, periodic, reflecting):  # type: ignore[no-
         padded[m] = source[_beyond(m - pad - shift, count, periodic, reflecting)]
 
 
-@njit(cache=True, nogil=True, inline="never")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _face_flux(a, b, C, d, e, w, c, flux):  # type: ignore[no-untyped-def]
     """What leaves the donor cells `C` through their downwind face; `a`, `b` lie upwind, `d`, `e` downwind.
 
@@ -61,14 +62,15 @@ def _face_flux(a, b, C, d, e, w, c, flux):  # type: ignore[no-untyped-def]
         flux[i] = c * (centre + min(highest, max(lowest, high)))
 
 
-@njit(cache=True, nogil=True, inline="never")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _carry_x(source, target, shift, c, w, periodic, row, flux):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(ny):
         _fill(source[j], row, PAD, shift, periodic, False)
         out = target[j]
         if c == 0.0:
-            out[:] = row[PAD : PAD + nx]
+            for i in range(nx):
+                out[i] = row[i + PAD]
         else:
             n = nx + 1  # faces, the first one on the left of cell 0
             _face_flux(
@@ -78,7 +80,7 @@ def _carry_x(source, target, shift, c, w, periodic, row, flux):  # type: ignore[
                 out[i] = row[i + PAD] - (flux[i + 1] - flux[i])
 
 
-@njit(cache=True, nogil=True, inline="never")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _carry_y(source, target, shift, c, w, periodic, before, after):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(-1, ny):
@@ -100,11 +102,12 @@ def _carry_y(source, target, shift, c, w, periodic, before, after):  # type: ign
                 for i in range(nx):
                     out[i] = rows[i] - (after[i] - before[i])
             else:
-                out[:] = rows
+                for i in range(nx):
+                    out[i] = rows[i]
         before, after = after, before
 
 
-@njit(cache=True, nogil=True, inline="never")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _spread_x(source, target, half, weights, periodic, row):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(ny):
@@ -118,7 +121,7 @@ def _spread_x(source, target, half, weights, periodic, row):  # type: ignore[no-
                 out[i] += weight * (left[i] + right[i])
 
 
-@njit(cache=True, nogil=True, inline="never")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _spread_y(source, target, half, weights, periodic):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(ny):
@@ -133,7 +136,7 @@ def _spread_y(source, target, half, weights, periodic):  # type: ignore[no-untyp
                 out[i] += weight * (left[i] + right[i])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def move_levels(  # type: ignore[no-untyped-def]
     air, first, stride, y_first, shifts, parts, carry_weights, halves, spread_weights, periodic
 ):
@@ -188,4 +191,62 @@ def move_levels(  # type: ignore[no-untyped-def]
                 _spread_y(source, target, half, spread_weights[1, k], periodic[1])
             source, target, moved = target, source, not moved
         if moved:
-            target[:] = source
+            for j in range(ny):
+                for i in range(nx):
+                    target[j, i] = source[j, i]
+
+
+BLOCK = 128  # columns that are treated together: a block of a hundred levels fits into the second cache
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def spread_columns(matrix, begins, ends, air, result, first, last):  # type: ignore[no-untyped-def]
+    """Multiply the columns ``first … last - 1`` of `air` by `matrix`.
+
+    A product of matrices of its own: it skips what is zero, and leaves no idle threads of a linear algebra
+    library that compete with the other loops. ``contract`` lets a product and a sum round once instead of
+    twice; no other freedom is given to the compiler.
+
+    Parameters
+    ----------
+    matrix : (nz, nz + extra) float64
+    begins, ends : (nz,) int64
+        The first `nz` columns of row i of `matrix` vanish outside ``begins[i] … ends[i] - 1``.
+    air : (nz + extra, columns) float64
+    result : (at least nz, columns) float64
+        Its first `nz` rows are written.
+    first, last : int
+    """
+    levels, rows = matrix.shape
+    block, line = np.empty((rows, BLOCK)), np.empty(BLOCK)
+    for corner in range(first, last, BLOCK):
+        count = min(BLOCK, last - corner)
+        for k in range(rows):
+            for m in range(count):
+                block[k, m] = air[k, corner + m]
+        for i in range(levels):
+            for m in range(count):
+                line[m] = 0.0
+            k = begins[i]
+            while k < rows:
+                if k >= ends[i] and k < levels:
+                    k = levels  # on to the boundaries
+                # four levels in one sweep over the columns
+                if k + 4 <= ends[i]:
+                    w0, w1, w2, w3 = matrix[i, k], matrix[i, k + 1], matrix[i, k + 2], matrix[i, k + 3]
+                    for m in range(count):
+                        line[m] += (
+                            w0 * block[k, m]
+                            + w1 * block[k + 1, m]
+                            + w2 * block[k + 2, m]
+                            + w3 * block[k + 3, m]
+                        )
+                    k += 4
+                else:
+                    weight = matrix[i, k]
+                    if weight != 0.0:
+                        for m in range(count):
+                            line[m] += weight * block[k, m]
+                    k += 1
+            for m in range(count):
+                result[i, corner + m] = line[m]

@@ -16,7 +16,7 @@ from nigemizu.errors import InputError
 from nigemizu.heat.boundary import ExchangeGround, FluxGround, GroundBoundary, HeldGround, Sides, Top
 from nigemizu.heat.grid import Grid, available_memory, require_memory
 from nigemizu.heat.horizontal import HorizontalMotion
-from nigemizu.heat.kernels import move_levels
+from nigemizu.heat.kernels import move_levels, spread_columns
 from nigemizu.heat.quantity import Quantity
 from nigemizu.heat.transport import Diffusivity, Wind
 from nigemizu.heat.vertical import BOUNDARY_ROWS, VerticalDiffusion
@@ -270,7 +270,7 @@ class _Stepper:
         self.now[: self.levels] = initial.reshape(self.levels, -1)
         held = _top_temperature(grid, initial) if top.temperature is None else top.temperature
         self.now[-1] = self.next[-1] = held
-        self.columns: dict[float, np.ndarray] = {}
+        self.columns: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self.motions: dict[float, HorizontalMotion] = {}
         self.y_first = False
         self.workers = _processors()
@@ -293,10 +293,18 @@ class _Stepper:
         if opens:
             self._move(0.5 * step)
         if step not in self.columns:
-            self.columns[step] = self.column.step(step)
+            matrix = self.column.step(step)
+            self.columns[step] = (matrix, *self.column.reach(matrix))
         self.ground.fill(self.now[self.levels], time)
         self.ground.fill(self.now[self.levels + 1], end)
-        np.matmul(self.columns[step], self.now, out=self.next[: self.levels])
+        corners = np.linspace(0, self.now.shape[1], self.workers + 1).astype(np.int64)
+        self._share(
+            spread_columns,
+            [
+                (*self.columns[step], self.now, self.next, first, last)
+                for first, last in itertools.pairwise(corners)
+            ],
+        )
         self.now, self.next = self.next, self.now
         self._move(0.5 * step if closes else step)
 
@@ -308,28 +316,27 @@ class _Stepper:
         motion = self.motions[step]
         if motion.is_still:
             return
-        assert self.pool is not None
         air = self.now[: self.levels].reshape(self.grid.shape)
-        tasks = [
-            self.pool.submit(
-                move_levels,
-                air,
-                worker,
-                self.workers,
-                self.y_first,
-                motion.shifts,
-                motion.parts,
-                motion.carry,
-                motion.halves,
-                motion.kernels,
-                motion.periodic,
-            )
-            for worker in range(self.workers)
-        ]
-        for task in tasks:
-            task.result()
+        coefficients = (
+            motion.shifts,
+            motion.parts,
+            motion.carry,
+            motion.halves,
+            motion.kernels,
+            motion.periodic,
+        )
+        self._share(
+            move_levels,
+            [(air, worker, self.workers, self.y_first, *coefficients) for worker in range(self.workers)],
+        )
         # the limiter makes the order of the axes matter a little: take turns
         self.y_first = not self.y_first
+
+    def _share(self, work: Callable[..., None], portions: Sequence[tuple[object, ...]]) -> None:
+        """Do the portions of a compiled loop side by side; they touch different parts of the air."""
+        assert self.pool is not None
+        for task in [self.pool.submit(work, *portion) for portion in portions]:
+            task.result()
 
     def state(self, time: float) -> State:
         """A copy of the air at `time` [s]."""

@@ -6,8 +6,8 @@ On every column of cells the heat equation in finite volumes is a linear system 
           \frac{T_i - T_{i-1}}{R_{i-1/2}}\right), \qquad R = \int \frac{dz}{K(z)},
 
 plus what the ground and the top add. Since `A` depends on height alone, one matrix :math:`e^{A \Delta t}`
-serves all columns, and a step is one product of matrices. No implicit Runge–Kutta or multistep scheme of
-second order is free of new extrema at every step (Bolley and Crouzeix 1978); the exponential is both, because
+serves all columns, and a step is one product of matrices, stable like an implicit one. No implicit
+Runge–Kutta or multistep scheme of second order is free of new extrema at every step (Bolley and Crouzeix 1978); the exponential is both, because
 `A` has no negative element off its diagonal. It is computed without cancellation, as a sum of non-negative
 terms (uniformization) that is squared repeatedly.
 
@@ -32,6 +32,9 @@ __all__ = ["BOUNDARY_ROWS", "VerticalDiffusion"]
 
 BOUNDARY_ROWS: Final = 3
 """Rows that follow the levels: the ground's number at the start and at the end of the step, and the top's."""
+
+NEGLIGIBLE: Final = 1e-17
+"""Weight of a distant level below which it is left out: less than the round-off of the temperature."""
 
 LARGEST_NORM: Final = 0.5
 TERMS: Final = 20
@@ -150,6 +153,9 @@ class VerticalDiffusion:
             result = result @ result
             self._restore(result)
 
+        inner = result[:levels, :levels]
+        inner[np.maximum(inner, inner.T) < NEGLIGIBLE] = 0.0
+        self._restore(result)
         matrix = result[:levels].copy()
         if self.is_flux:
             # all that flows in must arrive: exactly the flux times the time
@@ -158,6 +164,15 @@ class VerticalDiffusion:
         # from (value at the start, change) to (value at the start, value at the end)
         matrix[:, start] = np.maximum(matrix[:, start] - matrix[:, slope], 0.0)
         return matrix
+
+    @staticmethod
+    def reach(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """First level and end of the levels that count, for every row of a `step`: two (nz,) int64."""
+        levels = len(matrix)
+        counts = matrix[:, :levels] != 0.0
+        begins = np.argmax(counts, axis=1)
+        ends = np.where(counts.any(axis=1), levels - np.argmax(counts[:, ::-1], axis=1), begins)
+        return begins.astype(np.int64), ends.astype(np.int64)
 
     def _restore(self, result: np.ndarray) -> None:
         """Take away the round-off that would grow with every squaring, in place.
