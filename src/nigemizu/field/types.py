@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, final
+from typing import Any, Final, Literal, TypeAlias, final
 
 import drjit as dr
 
@@ -16,15 +15,14 @@ __all__ = ["Backend", "Precision", "Types", "types"]
 Backend: TypeAlias = Literal["llvm", "cuda"]
 Precision: TypeAlias = Literal["single", "double"]
 
-OLDEST_LLVM = 16  # older ones abort the whole process on machines with AVX-512
+OLDEST_LLVM: Final = 16  # older ones abort the whole process on machines with AVX-512
 
-_LLVM_REMEDY = "install it (Debian, Ubuntu: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH"
+_LLVM_REMEDY: Final = "install it (Debian, Ubuntu: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH"
 
 
 @final
-@dataclass(frozen=True)
 class Types:
-    """The Dr.Jit array types of one backend and precision.
+    """The Dr.Jit array types of one backend and precision. Made by `types`; frozen.
 
     Attributes
     ----------
@@ -39,16 +37,24 @@ class Types:
         Single and double arrays whatever the precision, for stored data.
     """
 
-    backend: Backend
-    precision: Precision
-    differentiable: bool
-    Float: Any
-    UInt32: Any
-    Int32: Any
-    Bool: Any
-    Array3f: Any
-    Float32: Any
-    Float64: Any
+    # Not a dataclass: Dr.Jit would take it for a part of the state of loops that mention it.
+
+    def __init__(self, backend: Backend, precision: Precision, differentiable: bool) -> None:
+        module = importlib.import_module(f"drjit.{backend}.ad" if differentiable else f"drjit.{backend}")
+        single = precision == "single"
+        self.backend: Final = backend
+        self.precision: Final = precision
+        self.differentiable: Final = differentiable
+        self.Float: Final[Any] = module.Float if single else module.Float64
+        self.UInt32: Final[Any] = module.UInt32
+        self.Int32: Final[Any] = module.Int32
+        self.Bool: Final[Any] = module.Bool
+        self.Array3f: Final[Any] = module.Array3f if single else module.Array3f64
+        self.Float32: Final[Any] = module.Float
+        self.Float64: Final[Any] = module.Float64
+
+    def __repr__(self) -> str:
+        return f"types({self.backend!r}, {self.precision!r}, differentiable={self.differentiable})"
 
     def storage(self, precision: Precision) -> Any:
         """Array type that stores data in `precision`."""
@@ -96,20 +102,7 @@ def types(
         _check_llvm(llvm_version or _dr_jit_llvm_version)
     elif not dr.has_backend(dr.JitBackend.CUDA):
         raise MachineError("no usable NVIDIA graphics card and driver; use the llvm backend")
-    module = importlib.import_module(f"drjit.{backend}.ad" if differentiable else f"drjit.{backend}")
-    single = precision == "single"
-    return Types(
-        backend=backend,
-        precision=precision,
-        differentiable=differentiable,
-        Float=module.Float if single else module.Float64,
-        UInt32=module.UInt32,
-        Int32=module.Int32,
-        Bool=module.Bool,
-        Array3f=module.Array3f if single else module.Array3f64,
-        Float32=module.Float,
-        Float64=module.Float64,
-    )
+    return Types(backend, precision, differentiable)
 
 
 def _dr_jit_llvm_version() -> tuple[int, ...] | None:
