@@ -1,0 +1,59 @@
+"""Files that people open: pictures, films, air, diagrams. Whole or not at all, and saying what made them.
+
+The names are imported when they are first used, so that checking a path needs no codec.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from nigemizu.output.air import write_air
+    from nigemizu.output.diagram import DiagramRay, Outline, Profile, ray_diagram, vanishing_line
+    from nigemizu.output.files import ready_to_write, whole_file, whole_folder
+    from nigemizu.output.film import write_film
+    from nigemizu.output.frames import FrameFolder
+    from nigemizu.output.pictures import encoded, read_picture, write_exr, write_picture, write_png
+    from nigemizu.output.provenance import Provenance
+
+__all__ = [
+    "DiagramRay",
+    "FrameFolder",
+    "Outline",
+    "Profile",
+    "Provenance",
+    "encoded",
+    "ray_diagram",
+    "read_picture",
+    "ready_to_write",
+    "vanishing_line",
+    "whole_file",
+    "whole_folder",
+    "write_air",
+    "write_exr",
+    "write_film",
+    "write_picture",
+    "write_png",
+]
+
+_HOMES: Final = {
+    "air": ("write_air",),
+    "diagram": ("DiagramRay", "Outline", "Profile", "ray_diagram", "vanishing_line"),
+    "files": ("ready_to_write", "whole_file", "whole_folder"),
+    "film": ("write_film",),
+    "frames": ("FrameFolder",),
+    "pictures": ("encoded", "read_picture", "write_exr", "write_picture", "write_png"),
+    "provenance": ("Provenance",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"nigemizu.output.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -1,0 +1,384 @@
+"""The figure of every mirage paper: rays in height against distance, with the profile that bends them."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nigemizu.errors import InputError
+from nigemizu.output.files import write_bytes
+from nigemizu.output.provenance import Provenance
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["DiagramRay", "Outline", "Profile", "ray_diagram", "vanishing_line"]
+
+FloatArray: TypeAlias = NDArray[np.float64]
+Kind: TypeAlias = Literal["turned", "direct", "sky", "lost"]
+
+_COLOURS: Final = {"turned": "#c8442b", "direct": "#2a6f97", "sky": "#8fb3c9", "lost": "#b0b0b0"}
+_NAMES: Final = {
+    "turned": "turned back up by the hot air",
+    "direct": "to the ground or an object",
+    "sky": "to the sky",
+    "lost": "out of steps",
+}
+_INK: Final = "#22303a"
+_GROUND: Final = "#d9c7a3"
+_OBJECT: Final = "#b08d57"
+_POINTS: Final = 600  # per ray; more cannot be seen
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class DiagramRay:
+    """A ray as a polyline from the eye.
+
+    Parameters
+    ----------
+    x : (n,) float64, m
+        Distances.
+    z : (n,) float64, m
+        Heights.
+    status : {"hit", "escaped", "out-of-steps"}
+        How the ray ended.
+    """
+
+    x: FloatArray
+    z: FloatArray
+    status: str
+
+    def kind(self) -> Kind:
+        """``"turned"`` when the ray came down and went up again; otherwise by its end."""
+        lowest = int(np.argmin(self.z))
+        span = float(np.ptp(self.z))
+        if 0 < lowest < self.z.size - 1 and self.z[-1] > self.z[lowest] + 1e-6 * span:
+            return "turned"
+        return {"hit": "direct", "escaped": "sky"}.get(self.status, "lost")  # type: ignore[return-value]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The silhouette of an object from the side.
+
+    Parameters
+    ----------
+    name : str
+    x, z : (n,) float64, m
+        Corners in order.
+    """
+
+    name: str
+    x: FloatArray
+    z: FloatArray
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """The air over one place.
+
+    Parameters
+    ----------
+    height : (n,) float64, m
+    refractivity : (n,) float64, 1
+        n − 1.
+    temperature : (n,) float64, K, optional
+    """
+
+    height: FloatArray
+    refractivity: FloatArray
+    temperature: FloatArray | None = None
+
+
+def vanishing_line(rays: Sequence[DiagramRay], *, samples: int = 400) -> tuple[FloatArray, FloatArray]:
+    """Lowest height that can be seen at each distance: the lower envelope of a dense bundle of rays.
+
+    Parameters
+    ----------
+    rays : sequence of DiagramRay
+        From one eye, with elevations close together.
+    samples : int
+        Distances at which the envelope is taken.
+
+    Returns
+    -------
+    x : (m,) ndarray of float64, m
+    z : (m,) ndarray of float64, m
+        From the distance where the ground disappears to the end of the rays; both empty when the ground is
+        seen to the end.
+
+    Notes
+    -----
+    Limits: the envelope of a finite bundle, above the true line by as much as neighbouring rays are apart.
+    """
+    end = max((float(ray.x[-1]) for ray in rays), default=0.0)
+    on_ground = [float(ray.x[-1]) for ray in rays if ray.kind() == "direct" and ray.z[-1] <= 1e-3 * ray.z[0]]
+    begin = max(on_ground, default=float(min((ray.x[0] for ray in rays), default=0.0)))
+    distances = np.linspace(begin, end, samples)
+    heights = [np.interp(distances, ray.x, ray.z, left=np.inf, right=np.inf) for ray in rays]
+    lowest = np.min(heights, axis=0) if heights else np.full(samples, np.inf)
+    seen = np.isfinite(lowest)
+    return distances[seen], lowest[seen]
+
+
+def ray_diagram(
+    path: str | Path,
+    *,
+    rays: Sequence[DiagramRay],
+    profile: Profile | None = None,
+    objects: Sequence[Outline] = (),
+    vanishing: tuple[ArrayLike, ArrayLike] | None = None,
+    eye: tuple[float, float] | None = None,
+    title: str = "",
+    top: float | None = None,
+    provenance: Provenance | None = None,
+) -> Path:
+    """Draw height against distance for many rays, with objects, profile and vanishing line.
+
+    Parameters
+    ----------
+    path : path
+        ``.svg``, ``.png`` or ``.pdf``.
+    rays : sequence of DiagramRay
+    profile : Profile, optional
+        Drawn in a narrow panel that shares the axis of the heights.
+    objects : sequence of Outline
+    vanishing : pair of (m,) array_like, m, optional
+        Distances and lowest visible heights, as `vanishing_line` returns them.
+    eye : (float, float), m, optional
+        Distance and height; the beginning of the first ray unless given.
+    title : str
+    top : float, m, optional
+        Upper end of the axis; found from the rays that turned and from the objects unless given.
+    provenance : Provenance, optional
+        Kept in the file's metadata.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        Unknown extension, no rays, or a file that cannot be written.
+    MachineError
+        The disk is full.
+    """
+    target = Path(path)
+    kind = target.suffix.lower()
+    if kind not in (".svg", ".png", ".pdf"):
+        raise InputError(
+            "unknown kind of diagram", file=str(target), value=kind, expected=".svg, .png or .pdf"
+        )
+    if not rays:
+        raise InputError("there are no rays to draw", key="rays")
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    place = eye or (float(rays[0].x[0]), float(rays[0].z[0]))
+    upper = top or _top(rays, objects, place[1])
+    style: Any = {"font.size": 9.5, "axes.edgecolor": _INK, "axes.linewidth": 0.8, "text.color": _INK}
+    # A fixed salt and no dates: equal rays give equal files.
+    with rc_context({**style, "svg.hashsalt": "nigemizu", "axes.labelcolor": _INK}):
+        figure = Figure(figsize=(10.5, 5.0), layout="constrained")
+        if profile is None:
+            main = figure.add_subplot()
+        else:
+            side, main = figure.subplots(1, 2, sharey=True, width_ratios=[1, 4.6])
+            _draw_profile(side, profile, upper)
+        _draw_rays(main, rays)
+        _draw_objects(main, objects, upper)
+        if vanishing is not None:
+            _draw_vanishing(main, np.asarray(vanishing[0]), np.asarray(vanishing[1]), upper)
+        _finish(figure, main, rays, objects, place, upper, title, with_label=profile is None)
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=kind[1:], dpi=160, metadata=_metadata(kind, provenance or Provenance()))
+    return write_bytes(target, buffer.getvalue())
+
+
+def _top(rays: Sequence[DiagramRay], objects: Sequence[Outline], eye: float) -> float:
+    """Height that shows the turned rays, the eye, and as much of the objects as goes with them."""
+    turned = [float(ray.z.max()) for ray in rays if ray.kind() == "turned"]
+    tallest = max((float(np.max(outline.z)) for outline in objects), default=eye)
+    if not turned:
+        return 1.15 * max(eye, tallest)
+    return 1.15 * max(1.35 * eye, min(tallest, float(np.quantile(turned, 0.9))))
+
+
+def _draw_profile(axes: Axes, profile: Profile, upper: float) -> None:
+    shown = profile.height <= 1.02 * upper
+    axes.plot(1e6 * profile.refractivity[shown], profile.height[shown], color=_INK, lw=1.6)
+    axes.set_xlabel("$(n-1)\\times 10^6$")
+    axes.set_ylabel("height above the ground (m)")
+    axes.locator_params(axis="x", nbins=4)
+    axes.margins(x=0.12)
+    axes.spines[["top", "right"]].set_visible(False)
+    if profile.temperature is not None:
+        twin = axes.twiny()
+        warm = "#c8442b"
+        twin.plot(
+            profile.temperature[shown] - 273.15, profile.height[shown], color=warm, lw=1.4, ls=(0, (5, 2))
+        )
+        twin.set_xlabel("temperature (°C)", color=warm)
+        twin.tick_params(axis="x", colors=warm)
+        twin.locator_params(axis="x", nbins=4)
+        twin.margins(x=0.12)
+        twin.spines[["right"]].set_visible(False)
+        twin.spines["top"].set_color(warm)
+
+
+def _draw_rays(axes: Axes, rays: Sequence[DiagramRay]) -> None:
+    from matplotlib.collections import LineCollection
+
+    groups: dict[str, list[FloatArray]] = {}
+    for ray in rays:
+        chosen = np.unique(np.linspace(0, ray.x.size - 1, min(ray.x.size, _POINTS)).astype(int))
+        groups.setdefault(ray.kind(), []).append(np.column_stack([ray.x[chosen], ray.z[chosen]]))
+    width = float(np.clip(16.0 / len(rays) ** 0.75, 0.45, 1.1))
+    for order, kind in enumerate(("lost", "sky", "direct", "turned")):
+        if kind in groups:
+            axes.add_collection(
+                LineCollection(
+                    groups[kind],
+                    colors=_COLOURS[kind],
+                    linewidths=width,
+                    alpha=0.85,
+                    zorder=3 + 0.1 * order,
+                    label=_NAMES[kind],
+                    capstyle="round",
+                )
+            )
+
+
+def _draw_objects(axes: Axes, objects: Sequence[Outline], upper: float) -> None:
+    for outline in objects:
+        axes.fill(outline.x, outline.z, facecolor=_OBJECT, edgecolor="#6d5430", lw=1.0, alpha=0.55, zorder=2)
+        highest = float(np.max(outline.z))
+        clipped = highest > 0.93 * upper
+        middle = float(0.5 * (np.min(outline.x) + np.max(outline.x)))
+        axes.annotate(
+            outline.name,
+            (middle, upper if clipped else highest),
+            xytext=(0, -6 if clipped else 4),
+            textcoords="offset points",
+            ha="center",
+            va="top" if clipped else "bottom",
+            color="#4d3a1e",
+            weight="bold",
+            zorder=6,
+            path_effects=_halo(),
+        )
+
+
+def _draw_vanishing(axes: Axes, x: FloatArray, z: FloatArray, upper: float) -> None:
+    inside = np.flatnonzero(z <= upper)
+    if not inside.size:
+        return
+    axes.fill_between(x, 0.0, z, color="#22303a", alpha=0.10, lw=0, zorder=1.5)
+    axes.plot(x, z, color=_INK, lw=2.0, zorder=4)
+    axes.plot(x[0], z[0], "o", color=_INK, ms=4, zorder=5)
+    last = int(inside[-1])
+    label = int(inside[int(0.72 * (inside.size - 1))])
+    room = float(z[label]) > 0.12 * upper
+    axes.annotate(
+        "vanishing line\n(below it nothing is seen)",
+        (float(x[label]), float(z[label])),
+        xytext=(float(x[last]) * 0.985, 0.03 * upper if room else float(z[label]) + 0.12 * upper),
+        ha="right",
+        va="bottom",
+        fontsize=9,
+        zorder=6,
+        path_effects=_halo(),
+        arrowprops={"arrowstyle": "-", "color": _INK, "lw": 0.7},
+    )
+
+
+def _finish(
+    figure: Figure,
+    axes: Axes,
+    rays: Sequence[DiagramRay],
+    objects: Sequence[Outline],
+    eye: tuple[float, float],
+    upper: float,
+    title: str,
+    *,
+    with_label: bool,
+) -> None:
+    ends = [float(np.max(ray.x)) for ray in rays if ray.kind() != "sky"] or [float(rays[0].x[-1])]
+    far = max([*ends, *(float(np.max(outline.x)) for outline in objects)])
+    left = eye[0] - 0.03 * (far - eye[0])
+    axes.set_xlim(left, far + 0.01 * (far - eye[0]))
+    axes.set_ylim(-0.045 * upper, upper)
+    axes.axhspan(-upper, 0.0, color=_GROUND, zorder=2.5, lw=0)
+    axes.axhline(0.0, color="#8a744a", lw=1.0, zorder=4)
+    axes.plot(*eye, marker="o", ms=7, mfc="white", mec=_INK, mew=1.5, zorder=7)
+    axes.annotate(
+        "eye",
+        eye,
+        xytext=(4, 8),
+        textcoords="offset points",
+        weight="bold",
+        zorder=7,
+        path_effects=_halo(),
+    )
+    axes.set_xlabel("distance (m)")
+    if with_label:
+        axes.set_ylabel("height above the ground (m)")
+    else:
+        axes.tick_params(labelleft=False)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=4,
+        frameon=False,
+        handlelength=1.6,
+        columnspacing=1.4,
+        borderaxespad=0.2,
+    )
+    if title:
+        figure.suptitle(title, fontsize=12.5, weight="bold", x=0.012, ha="left")
+    figure.draw_without_rendering()
+    box = axes.get_window_extent()
+    width, height = np.ptp(axes.get_xlim()) / box.width, np.ptp(axes.get_ylim()) / box.height
+    axes.annotate(
+        f"heights × {_two_digits(width / height)}",
+        (1.0, 1.0),
+        xycoords="axes fraction",
+        xytext=(0, 4),
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
+        fontsize=8.5,
+        color="#66727a",
+    )
+
+
+def _halo() -> list[Any]:
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=2.5, foreground="white")]
+
+
+def _two_digits(number: float) -> str:
+    return f"{float(f'{number:.2g}'):g}"
+
+
+def _metadata(kind: str, provenance: Provenance) -> dict[str, Any]:
+    fields = provenance.fields()
+    if kind == ".png":
+        return dict(fields)
+    about = "\n".join(text for name, text in fields.items() if name != "Software")
+    if kind == ".svg":
+        return {"Creator": provenance.software, "Date": None, "Description": about}
+    return {"Creator": provenance.software, "CreationDate": None, "Subject": about}
