@@ -121,13 +121,18 @@ def vanishing_line(rays: Sequence[DiagramRay], *, samples: int = 400) -> tuple[F
     -----
     Limits: the envelope of a finite bundle, above the true line by as much as neighbouring rays are apart.
     """
-    end = max((float(ray.x[-1]) for ray in rays), default=0.0)
-    on_ground = [float(ray.x[-1]) for ray in rays if ray.kind() == "direct" and ray.z[-1] <= 1e-3 * ray.z[0]]
-    begin = max(on_ground, default=float(min((ray.x[0] for ray in rays), default=0.0)))
-    distances = np.linspace(begin, end, samples)
-    heights = [np.interp(distances, ray.x, ray.z, left=np.inf, right=np.inf) for ray in rays]
-    lowest = np.min(heights, axis=0) if heights else np.full(samples, np.inf)
-    seen = np.isfinite(lowest)
+    grounded = [ray for ray in rays if ray.status == "hit" and ray.z[-1] <= 1e-3 * ray.z[0]]
+    others = [ray for ray in rays if not any(ray is other for other in grounded)]
+    if not others:
+        return np.empty(0), np.empty(0)
+    begin = max(float(ray.x[-1]) for ray in grounded) if grounded else float(others[0].x[0])
+    distances = np.linspace(begin, max(float(ray.x[-1]) for ray in others), samples)
+    heights = np.array([np.interp(distances, ray.x, ray.z, left=np.inf, right=np.inf) for ray in others])
+    lowest, nearest = heights.min(axis=0), heights.argmin(axis=0)
+    # Where the lowest ray meets an object the line ends; what is higher up goes on, but limits nothing.
+    stopped = ~np.isfinite(heights[nearest[:-1], np.arange(1, samples)])
+    length = int(np.argmax(stopped)) + 1 if stopped.any() else samples
+    seen = np.isfinite(lowest) & (np.arange(samples) < length)
     return distances[seen], lowest[seen]
 
 
@@ -254,7 +259,6 @@ def _draw_rays(axes: Axes, rays: Sequence[DiagramRay]) -> None:
                     linewidths=width,
                     alpha=0.85,
                     zorder=3 + 0.1 * order,
-                    label=_NAMES[kind],
                     capstyle="round",
                 )
             )
@@ -284,22 +288,20 @@ def _draw_vanishing(axes: Axes, x: FloatArray, z: FloatArray, upper: float) -> N
     inside = np.flatnonzero(z <= upper)
     if not inside.size:
         return
-    axes.fill_between(x, 0.0, z, color="#22303a", alpha=0.10, lw=0, zorder=1.5)
+    axes.fill_between(x, 0.0, z, color=_INK, alpha=0.10, lw=0, zorder=1.5)
     axes.plot(x, z, color=_INK, lw=2.0, zorder=4)
     axes.plot(x[0], z[0], "o", color=_INK, ms=4, zorder=5)
-    last = int(inside[-1])
-    label = int(inside[int(0.72 * (inside.size - 1))])
-    room = float(z[label]) > 0.12 * upper
+    label = int(inside[int(0.8 * (inside.size - 1))])
     axes.annotate(
-        "vanishing line\n(below it nothing is seen)",
+        "vanishing line: below it nothing is seen",
         (float(x[label]), float(z[label])),
-        xytext=(float(x[last]) * 0.985, 0.03 * upper if room else float(z[label]) + 0.12 * upper),
+        xytext=(float(x[int(inside[-1])]) * 0.985, float(z[label]) + 0.13 * upper),
         ha="right",
         va="bottom",
         fontsize=9,
         zorder=6,
-        path_effects=_halo(),
-        arrowprops={"arrowstyle": "-", "color": _INK, "lw": 0.7},
+        bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": "none", "alpha": 0.88},
+        arrowprops={"arrowstyle": "-", "color": _INK, "lw": 0.9, "shrinkA": 0.0, "shrinkB": 1.0},
     )
 
 
@@ -337,7 +339,15 @@ def _finish(
     else:
         axes.tick_params(labelleft=False)
     axes.spines[["top", "right"]].set_visible(False)
+    from matplotlib.lines import Line2D
+
+    shown = {ray.kind() for ray in rays}
     axes.legend(
+        handles=[
+            Line2D([], [], color=_COLOURS[kind], lw=2.0, label=_NAMES[kind])
+            for kind in _NAMES
+            if kind in shown
+        ],
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
         ncols=4,
