@@ -48,7 +48,7 @@ class Stepper:
 
     Notes
     -----
-    All such compositions are symplectic: over long paths the Hamiltonian |p|² − n² wavers but does not
+    All such compositions are symplectic: over long paths the Hamiltonian ``|p|² − n²`` wavers but does not
     drift. In air that is stratified along z they keep the horizontal momentum, Snell's invariant, to
     round-off. Those that read the same backwards are reversible to round-off.
 
