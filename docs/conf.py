@@ -1,0 +1,52 @@
+"""Configuration of the documentation: Sphinx, with pages made from the code itself at each build."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version as installed_version
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+
+project = "nigemizu"
+author = copyright = "The nigemizu developers"
+release = version = installed_version("nigemizu")
+
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+]
+exclude_patterns = ["_build", "_generated/parts"]
+myst_enable_extensions = ["colon_fence", "dollarmath", "deflist"]
+myst_heading_anchors = 3
+
+# Units and defaults stand in the docstrings; the types of pydantic fields would only hide them.
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+
+html_theme = "furo"
+html_title = f"nigemizu {release}"
+html_theme_options = {"navigation_with_keys": True}
+html_static_path = []
+
+
+def _generate(app: Sphinx) -> None:
+    from generators import command_line, python_api, scene_reference, validation
+
+    parts = HERE / "_generated" / "parts"
+    parts.mkdir(parents=True, exist_ok=True)
+    command_line.write(parts / "command_line.rst")
+    scene_reference.write(parts / "scene.rst")
+    python_api.write(HERE / "_generated")
+    validation.write(parts / "validation.rst")
+
+
+def setup(app: Sphinx) -> None:
+    app.connect("builder-inited", _generate)
