@@ -65,7 +65,7 @@ def test_heights_at_the_wall_and_ground_hits() -> None:
 
 
 def test_image_is_inverted_below_the_fold() -> None:
-    """Between −8′ and −10′ lower rays still end lower, but −8′ to the ground they have turned on the way."""
+    """Of two rays that turn before the ground, the one seen lower ends higher at the wall."""
     air = field.ExponentialTemperature(TYPES)
     end = trace.march(
         air, *launch(TYPES, [-10.0, -11.0]), step=0.1, max_steps=10_000, surface=SCENE, details=True
