@@ -31,12 +31,16 @@ class Diffusivity(Value):
     Parameters
     ----------
     kind : {"molecular", "eddy", "table"}
-        ``molecular``: the same everywhere. ``eddy``: :math:`\alpha + \kappa u_* \min(z, z_\text{cap})`,
-        the mixing of turbulent air near the ground. ``table``: linear between `heights`.
+        ``molecular``: the same everywhere. ``eddy``:
+        :math:`\alpha + \kappa u_* \max(0, \min(z, z_\text{cap}) - z_\text{sub})`, the mixing of turbulent
+        air above a sublayer at the ground in which eddies have no room. ``table``: linear between `heights`.
     molecular : float, m2 s-1
         Molecular diffusivity of heat, :math:`\alpha`; 2.2e-5 in air at 300 K.
     friction_velocity : float, m s-1
         :math:`u_*` of ``eddy``.
+    sublayer : float, m
+        Thickness :math:`z_\text{sub}` of the layer next to the ground in which only molecules carry heat:
+        of the order of ten times the kinematic viscosity (1.6e-5 m2/s) over :math:`u_*`, some millimetres.
     cap_height : float, m
         Height above which the eddies' diffusivity stays constant.
     heights, values : tuple of float, m and m2 s-1
@@ -60,6 +64,7 @@ class Diffusivity(Value):
     kind: Literal["molecular", "eddy", "table"] = "molecular"
     molecular: SquareMetresPerSecond = Field(default=2.2e-5, gt=0)
     friction_velocity: MetresPerSecond = Field(default=0.0, ge=0)
+    sublayer: Metres = Field(default=0.0, ge=0)
     cap_height: Metres = Field(default=10.0, gt=0)
     heights: tuple[Metres, ...] = ()
     values: tuple[SquareMetresPerSecond, ...] = ()
@@ -74,8 +79,8 @@ class Diffusivity(Value):
                 raise ValueError("values: a diffusivity is above zero")
         elif self.heights or self.values:
             raise ValueError(f"heights, values: only for kind 'table', not {self.kind!r}")
-        if self.kind != "eddy" and self.friction_velocity:
-            raise ValueError(f"friction_velocity: only for kind 'eddy', not {self.kind!r}")
+        if self.kind != "eddy" and (self.friction_velocity or self.sublayer):
+            raise ValueError(f"friction_velocity, sublayer: only for kind 'eddy', not {self.kind!r}")
         if self.kind == "eddy" and not self.friction_velocity:
             raise ValueError("friction_velocity: kind 'eddy' needs one above zero")
         chosen = self.horizontal_factor if self.horizontal is None else self.horizontal
@@ -89,7 +94,10 @@ class Diffusivity(Value):
         if self.kind == "table":
             return np.asarray(np.interp(height, self.heights, self.values))
         return np.asarray(
-            self.molecular + VON_KARMAN * self.friction_velocity * np.minimum(height, self.cap_height)
+            self.molecular
+            + VON_KARMAN
+            * self.friction_velocity
+            * np.maximum(np.minimum(height, self.cap_height) - self.sublayer, 0.0)
         )
 
     def sideways(self, height: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
@@ -104,8 +112,14 @@ class Diffusivity(Value):
     def resistance(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
         r"""Resistance :math:`\int dz / K(z)` [s m-1] of the air between two heights [m].
 
-        Gauss–Legendre quadrature with 12 nodes: exact to round-off where the diffusivity is smooth.
+        Gauss–Legendre quadrature with 12 nodes between the kinks of the diffusivity: exact to round-off.
         """
+        kinks = self.heights if self.kind == "table" else (self.sublayer, self.cap_height)
+        parts = [np.clip(kink, lower, upper) for kink in sorted(kinks)]
+        pieces = itertools.pairwise([lower, *parts, upper])
+        return np.asarray(sum(self._smooth_resistance(*ends) for ends in pieces))
+
+    def _smooth_resistance(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
         nodes, weights = np.polynomial.legendre.leggauss(12)
         half = 0.5 * (upper - lower)
         heights = (0.5 * (upper + lower))[:, None] + half[:, None] * nodes

@@ -8,8 +8,8 @@ On every column of cells the heat equation in finite volumes is a linear system 
 plus what the ground and the top add. Since `A` depends on height alone, one matrix :math:`e^{A \Delta t}`
 serves all columns, and a step is one product of matrices, stable like an implicit one. No implicit
 Runge–Kutta or multistep scheme of second order is free of new extrema at every step (Bolley and Crouzeix
-1978); the exponential is, because `A` has no negative element off its diagonal. It is computed without cancellation, as a sum of non-negative
-terms (uniformization) that is squared repeatedly.
+1978); the exponential is, because `A` has no negative element off its diagonal. It is computed without
+cancellation, as a sum of non-negative terms (uniformization) that is squared repeatedly.
 
 References
 ----------
