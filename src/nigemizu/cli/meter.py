@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, final
 
 from nigemizu.progress import SILENT, ProgressMeter
@@ -13,9 +15,17 @@ if TYPE_CHECKING:
 __all__ = ["meter"]
 
 
-def meter(*, quiet: bool) -> ProgressMeter:
+@contextmanager
+def meter(*, quiet: bool) -> Iterator[ProgressMeter]:
     """A meter that draws on the terminal, or the silent one in a pipe and when asked to be quiet."""
-    return SILENT if quiet or not sys.stderr.isatty() else _TerminalMeter()
+    if quiet or not sys.stderr.isatty():
+        yield SILENT
+        return
+    drawing = _TerminalMeter()
+    try:
+        yield drawing
+    finally:
+        drawing.close()  # an interrupted bar would leave the cursor hidden
 
 
 @final
@@ -41,8 +51,14 @@ class _TerminalMeter(ProgressMeter):
             return
         self._progress.remove_task(self._tasks.pop())
         if not self._tasks:
+            self.close()
+
+    def close(self) -> None:
+        """Take the bars away, finished or not."""
+        if self._progress is not None:
             self._progress.stop()
-            self._progress = None
+        self._progress = None
+        self._tasks.clear()
 
 
 def _bars() -> Progress:

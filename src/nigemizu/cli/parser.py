@@ -6,6 +6,7 @@ import argparse
 import difflib
 import importlib
 import re
+import shlex
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
@@ -45,6 +46,7 @@ def parse(typed: Sequence[str]) -> argparse.Namespace:
     if verb is not None and joined[0] == verb and verb not in verbs:
         raise InputError("unknown verb", value=verb, remedy=_hint(verb, tuple(verbs)))
     options, unknown = parser.parse_known_args(joined)
+    options.command = shlex.join(["nigemizu", *typed])
     if unknown:
         flag = unknown[0].partition("=")[0]
         if not flag.startswith("-"):

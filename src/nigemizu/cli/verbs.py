@@ -35,47 +35,46 @@ def render(options: argparse.Namespace) -> int:
     from nigemizu.output import ready_to_write
 
     scene = _scene(options)
-    output = ready_to_write(_output(options, ".png"), (".png", ".exr"))
+    common: dict[str, Any] = {"time": options.time, "air": options.air, "variant": options.variant}
+    output = ready_to_write(_output(options, ".png"), (".png",) if options.compare else (".png", ".exr"))
     _use_threads(options.threads)
-    common = {"time": options.time, "air": options.air, "variant": options.variant}
-    progress = meter(quiet=options.quiet)
-    if options.compare:
-        from nigemizu.scene.comparison import render_comparison
-
-        for written in render_comparison(scene, output, **common, progress=progress):
-            print(written)
-        return 0
-    print(scene.render(**common, progress=progress).save(output))
+    with _naming(options.scene), meter(quiet=options.quiet) as progress:
+        if options.compare:
+            written = scene.compare(output, **common, command=options.command, progress=progress)
+        else:
+            picture = scene.render(**common, progress=progress)
+            written = [picture.save(output, command=options.command)]
+    print(*written, sep="\n")
     return 0
 
 
 def animate(options: argparse.Namespace) -> int:
     """``nigemizu animate``."""
-    from nigemizu.output import ready_to_write
-
     scene = _scene(options)
-    output = ready_to_write(_output(options, ".mp4"), (".mp4",))
     _use_threads(options.threads)
-    written = scene.animate(
-        output,
-        air=options.air,
-        workers=options.workers,
-        variant=options.variant,
-        progress=meter(quiet=options.quiet),
-    )
+    with _naming(options.scene), meter(quiet=options.quiet) as progress:
+        written = scene.animate(
+            _output(options, ".mp4"),
+            air=options.air,
+            workers=options.workers,
+            variant=options.variant,
+            command=options.command,
+            progress=progress,
+        )
     print(written)
     return 0
 
 
 def simulate(options: argparse.Namespace) -> int:
     """``nigemizu simulate``."""
-    from nigemizu.output import ready_to_write, write_air
+    from nigemizu.output import ready_to_write
 
     scene = _scene(options)
     output = ready_to_write(_output(options, ".zarr"), (".zarr", ".nc"))
     _use_threads(options.threads)
-    air = scene.simulate(progress=meter(quiet=options.quiet))
-    print(write_air(air, output))
+    with _naming(options.scene), meter(quiet=options.quiet) as progress:
+        written = scene.save_air(output, command=options.command, progress=progress)
+    print(written)
     return 0
 
 
@@ -84,23 +83,24 @@ def trace(options: argparse.Namespace) -> int:
     from nigemizu.output import ready_to_write
 
     scene = _scene(options)
-    output = None
     if options.output is not None:
-        output = ready_to_write(Path(options.output), (".csv", ".nc", ".png", ".svg"))
+        ready_to_write(options.output, (".csv", ".nc", ".png", ".svg"))
     elif not options.json:
         raise InputError("nothing to write", key="trace", remedy="add --json, or -o rays.svg (.png, .csv, .nc)")
     _use_threads(options.threads)
-    rays = scene.trace(
-        options.elevation,
-        options.azimuth,
-        time=options.time,
-        air=options.air,
-        variant=options.variant,
-        progress=meter(quiet=options.quiet),
-    )
-    if output is not None:
-        written = rays.save(output)
-        print(written, file=sys.stderr if options.json else sys.stdout)
+    with _naming(options.scene), meter(quiet=options.quiet) as progress:
+        rays = scene.trace(
+            options.elevation,
+            options.azimuth,
+            time=options.time,
+            air=options.air,
+            paths=options.output is not None,
+            variant=options.variant,
+            progress=progress,
+        )
+        if options.output is not None:
+            written = rays.save(options.output, command=options.command)
+            print(written, file=sys.stderr if options.json else sys.stdout)
     if options.json:
         print(json.dumps(rays.as_records(), indent=1, allow_nan=False))
     return 0

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from nigemizu.scene import running
     from nigemizu.scene.picture import RenderedPicture
     from nigemizu.scene.rays import TracedRays
+    from nigemizu.scene.running import AirSource
 
 __all__ = ["FilmSpec", "Scene", "TimeSpec", "builtin_scenes", "load"]
 
@@ -270,11 +271,22 @@ class Scene(Value):
 
         return running.simulate(self, self.time.stored if times is None else tuple(times), progress)
 
+    def save_air(
+        self, path: str | os.PathLike[str], *, command: str = "", progress: ProgressMeter = SILENT
+    ) -> Path:
+        """Heat the air and write it to ``.zarr`` or ``.nc``, instant by instant.
+
+        Holds one instant at a time, so that the dataset may be larger than the memory.
+        """
+        from nigemizu.scene import running
+
+        return running.save_air(self, Path(path), command, progress)
+
     def air_at(
         self,
         time: float | None = None,
         *,
-        air: xarray.Dataset | str | os.PathLike[str] | None = None,
+        air: AirSource = None,
         progress: ProgressMeter = SILENT,
     ) -> running.AirVolume:
         """The refractive-index volume at an instant [s], simulated, or taken from the dataset `air`."""
@@ -286,7 +298,7 @@ class Scene(Value):
         self,
         time: float | None = None,
         *,
-        air: xarray.Dataset | str | os.PathLike[str] | None = None,
+        air: AirSource = None,
         method: str | None = None,
         samples: int | None = None,
         variant: str = "auto",
@@ -298,7 +310,7 @@ class Scene(Value):
         ----------
         time : float, s, optional
             Instant to show; that of `time` unless given.
-        air : dataset or path, optional
+        air : dataset, path or AirVolume, optional
             Air to look through instead of simulating it.
         method : {"bent", "straight", "layered"}, optional
             How light travels, instead of ``tracer.method``.
@@ -318,15 +330,44 @@ class Scene(Value):
 
         return rendering.render(self._seen(method, samples), time, air, variant, progress)
 
+    def compare(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        time: float | None = None,
+        air: AirSource = None,
+        variant: str = "auto",
+        command: str = "",
+        progress: ProgressMeter = SILENT,
+    ) -> list[Path]:
+        """Render by straight, layered and bent light, into one labelled picture and each alone.
+
+        Parameters
+        ----------
+        path : path
+            The ``.png`` to write; the single pictures go beside it, ``…_straight.png`` and so on.
+        time, air, variant, command, progress
+            As for `render` and `animate`.
+
+        Returns
+        -------
+        list of Path
+            The comparison, then the single pictures.
+        """
+        from nigemizu.scene import comparison
+
+        return comparison.compare(self, Path(path), time, air, variant, command, progress)
+
     def animate(
         self,
         path: str | os.PathLike[str],
         *,
-        air: xarray.Dataset | str | os.PathLike[str] | None = None,
+        air: AirSource = None,
         method: str | None = None,
         samples: int | None = None,
         workers: int = 1,
         variant: str = "auto",
+        command: str = "",
         progress: ProgressMeter = SILENT,
     ) -> Path:
         """Render the film `film` into an MP4 and a folder of numbered frames beside it.
@@ -336,12 +377,14 @@ class Scene(Value):
         Parameters
         ----------
         path : path
-            The ``.mp4`` to write.
+            The ``.mp4`` (or ``.gif``, ``.webp``) to write.
         workers : int
             Processes that render. More than one needs the calling script to protect its main part with
             ``if __name__ == "__main__":``.
         air, method, samples, variant, progress
             As for `render`.
+        command : str
+            Kept in the film's header: how it was made.
 
         Returns
         -------
@@ -350,7 +393,8 @@ class Scene(Value):
         """
         from nigemizu.scene import film
 
-        return film.animate(self._seen(method, samples), Path(path), air, workers, variant, progress)
+        seen = self._seen(method, samples)
+        return film.animate(seen, Path(path), air, workers, variant, command, progress)
 
     def trace(
         self,
@@ -358,8 +402,9 @@ class Scene(Value):
         azimuths: Iterable[float] | None = None,
         *,
         time: float | None = None,
-        air: xarray.Dataset | str | os.PathLike[str] | None = None,
+        air: AirSource = None,
         method: str | None = None,
+        paths: bool = True,
         variant: str = "auto",
         progress: ProgressMeter = SILENT,
     ) -> TracedRays:
@@ -368,10 +413,12 @@ class Scene(Value):
         Parameters
         ----------
         elevations : iterable of float, degrees, optional
-            Above the horizontal; a fan over the camera's view unless given.
+            Above the horizontal; a fan over what the camera sees near the horizon unless given.
         azimuths : iterable of float, degrees, optional
             From the camera's heading, positive to the left; 0 unless given. Every elevation is traced at
             every azimuth.
+        paths : bool
+            Whether to keep the points along the rays, which the diagram shows.
         time, air, method, variant, progress
             As for `render`.
 
@@ -382,7 +429,16 @@ class Scene(Value):
         """
         from nigemizu.scene import rays
 
-        return rays.trace(self._seen(method, None), elevations, azimuths, time, air, variant, progress)
+        return rays.trace(
+            self._seen(method, None),
+            elevations,
+            azimuths,
+            time=time,
+            air=air,
+            paths=paths,
+            variant=variant,
+            progress=progress,
+        )
 
     def _seen(self, method: str | None, samples: int | None) -> Scene:
         changes = {"tracer.method": method, "camera.samples": samples}

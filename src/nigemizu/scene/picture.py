@@ -35,11 +35,12 @@ class RenderedPicture:
     statuses: dict[str, int]
     scene: Scene
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: str | os.PathLike[str], *, command: str = "") -> Path:
         """Write ``.png`` (8 bits, sRGB) or ``.exr`` (linear), whole or not at all, and return where it is.
 
-        The scene is embedded, so that the picture can be made again.
+        The scene and the `command` are embedded, so that the picture can be made again.
         """
-        from nigemizu.output import write_picture
+        from nigemizu.output import Provenance, write_picture
 
-        return write_picture(self.pixels, Path(path), scene=self.scene.to_toml())
+        provenance = Provenance(scene=self.scene.to_toml(), command=command)
+        return write_picture(Path(path), self.pixels, provenance=provenance)

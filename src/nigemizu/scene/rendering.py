@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, final
 
 from nigemizu.errors import NigemizuWarning
@@ -13,7 +14,7 @@ from nigemizu.scene.running import AirSource, AirVolume, air_at
 if TYPE_CHECKING:
     from nigemizu.scene.model import Scene
 
-__all__ = ["Studio", "render"]
+__all__ = ["Studio", "render", "warn_of_lost_rays"]
 
 # Fewer lost rays than this cannot be seen in a picture.
 _SEEN_SHARE: Final = 1e-4
@@ -32,14 +33,9 @@ class Studio:
     """
 
     def __init__(self, scene: Scene, variant: str) -> None:
-        from nigemizu.render.settings import Settings
-        from nigemizu.render.variant import select_variant
+        from nigemizu.render import Settings, build, integrator, select_variant
 
-        self._backend = select_variant(variant).split("_", 1)[0]
-        # Mitsuba's classes belong to a variant: these modules come after its choice.
-        from nigemizu.render.assembly import build
-        from nigemizu.render.integrator import integrator
-
+        select_variant(variant)
         self._scene = scene
         settings = Settings(tracer=scene.tracer, visibility=scene.light.visibility)
         self._integrator = integrator(settings=settings)
@@ -48,16 +44,16 @@ class Studio:
     @property
     def surfaces(self) -> Any:
         """The objects as the callback that rays are traced against."""
-        from nigemizu.render.bending import surface_query
+        from nigemizu.render import surface_query
 
         return surface_query(self._built)
 
     def shoot(self, air: AirVolume | None, *, frame: int = 0, progress: ProgressMeter = SILENT) -> RenderedPicture:
         """Render the scene through `air` (None: no air); each `frame` draws its own random numbers."""
-        from nigemizu.render.picture import picture
+        from nigemizu.render import medium_of, picture
 
         scene = self._scene
-        self._integrator.set_medium(None if air is None else medium(scene, air, self._backend))
+        self._integrator.set_medium(None if air is None else medium_of(*air, tracer=scene.tracer))
         camera = scene.camera
         taken = picture(
             self._built,
@@ -67,29 +63,7 @@ class Studio:
             exposure=camera.exposure,
             progress=progress,
         )
-        _warn_of_lost_rays(taken.statuses, scene.tracer.max_steps)
         return RenderedPicture(taken.radiance, taken.statuses, scene)
-
-
-def medium(scene: Scene, air: AirVolume, backend: str, *, precision: str = "single") -> Any:
-    """The air on the device: the trilinear volume, or Berger's panes cut from its mean profile."""
-    from nigemizu import field
-
-    tracer = scene.tracer
-    types = field.types(backend, precision=precision, differentiable=True)
-    if tracer.method == "layered":
-        profile = air.refractivity.mean(axis=(1, 2))
-        return field.Layers.from_profile(
-            air.z,
-            profile,
-            types=types,
-            count=tracer.layers,
-            spacing=tracer.layer_spacing,
-            waviness_amplitude=tracer.waviness_amplitude,
-            waviness_length=tracer.waviness_length,
-            waviness_seed=tracer.waviness_seed,
-        )
-    return field.TrilinearVolume(air.x, air.y, air.z, air.refractivity, types=types, beyond=tracer.beyond)
 
 
 def render(
@@ -99,15 +73,18 @@ def render(
     scene.check()
     studio = Studio(scene, variant)
     volume = None if scene.tracer.method == "straight" else air_at(scene, time, air, progress)
-    return studio.shoot(volume, progress=progress)
+    picture = studio.shoot(volume, progress=progress)
+    warn_of_lost_rays(picture.statuses, scene)
+    return picture
 
 
-def _warn_of_lost_rays(statuses: dict[str, int], max_steps: int) -> None:
+def warn_of_lost_rays(statuses: Mapping[str, int], scene: Scene) -> None:
+    """Warn when so many rays ran out of steps that it can be seen."""
     total = sum(statuses.values())
     share = statuses.get("out-of-steps", 0) / total if total else 0.0
     if share > _SEEN_SHARE:
         warnings.warn(
-            f"{share:.2%} of the rays used up their {max_steps} steps before they ended; "
+            f"{share:.2%} of the rays used up their {scene.tracer.max_steps} steps before they ended; "
             "raise tracer.max_steps or tracer.step",
             NigemizuWarning,
             stacklevel=4,

@@ -16,11 +16,12 @@ from nigemizu.progress import ProgressMeter
 if TYPE_CHECKING:
     import xarray
 
+    from nigemizu.heat import State
     from nigemizu.scene.model import Scene
 
-__all__ = ["AirSource", "AirVolume", "air_at", "air_instants", "open_air", "simulate"]
+__all__ = ["AirSource", "AirVolume", "air_at", "air_instants", "open_air", "require_within", "save_air", "simulate"]
 
-AirSource: TypeAlias = "xarray.Dataset | str | os.PathLike[str] | None"
+AirSource: TypeAlias = "xarray.Dataset | AirVolume | str | os.PathLike[str] | None"
 FloatArray: TypeAlias = NDArray[np.float64]
 
 
@@ -52,8 +53,23 @@ def simulate(scene: Scene, times: tuple[float, ...], progress: ProgressMeter) ->
     return complete(dataset, scene.air)
 
 
+def save_air(scene: Scene, path: Path, command: str, progress: ProgressMeter) -> Path:
+    """See `nigemizu.scene.Scene.save_air`."""
+    from nigemizu.heat import complete, to_dataset
+    from nigemizu.output import ready_to_write, write_air
+
+    scene.check()
+    path = ready_to_write(path, (".zarr", ".nc"))
+    grid, about = scene.grid.build(), {"title": scene.title, "scene": scene.to_toml(), "history": command}
+    states = _states(scene, scene.time.stored, progress)
+    instants = (complete(to_dataset(grid, [state], **about), scene.air) for state in states)
+    return write_air(air=instants, path=path)
+
+
 def air_at(scene: Scene, time: float | None, air: AirSource, progress: ProgressMeter) -> AirVolume:
     """See `nigemizu.scene.Scene.air_at`."""
+    if isinstance(air, AirVolume):
+        return air
     shown = scene.time.shown if time is None else time
     return next(iter(air_instants(scene, (shown,), air, progress)))
 
@@ -64,9 +80,13 @@ def air_instants(
     """The air at each of the instants, one after another; only one is held."""
     from nigemizu.heat import refractivity_at, to_dataset
 
+    if isinstance(air, AirVolume):  # air that does not change
+        yield from (air for _ in times)
+        return
     _require_times(times, scene)
     if air is not None:
         dataset = open_air(air)
+        require_within(dataset, times)
         for time in times:
             yield AirVolume(*refractivity_at(dataset, time, scene.air))
         return
@@ -76,7 +96,7 @@ def air_instants(
         yield AirVolume(*refractivity_at(instant, state.time, scene.air))
 
 
-def open_air(air: AirSource) -> xarray.Dataset:
+def open_air(air: xarray.Dataset | str | os.PathLike[str]) -> xarray.Dataset:
     """The dataset, read when it is a file."""
     from nigemizu.heat import read_air
 
@@ -85,7 +105,6 @@ def open_air(air: AirSource) -> xarray.Dataset:
         if not path.exists():
             raise InputError("no such dataset", key="air", value=str(path), expected="a .zarr or .nc dataset")
         return read_air(path)
-    assert air is not None
     return air
 
 
@@ -112,3 +131,15 @@ def _require_times(times: tuple[float, ...], scene: Scene) -> None:
         raise InputError("no instant was asked for", key="times")
     if not all(np.isfinite(time) and time >= 0.0 for time in times):
         raise InputError("lies before the beginning", key="time", value=min(times), expected="seconds ≥ 0")
+
+
+def require_within(dataset: xarray.Dataset, times: tuple[float, ...]) -> None:
+    """Refuse a film that the dataset does not cover before its first frame."""
+    if "time" not in dataset.dims:
+        return
+    first, last = float(dataset["time"][0]), float(dataset["time"][-1])
+    for time in (min(times), max(times)):
+        if not first <= time <= last:
+            raise InputError(
+                "the dataset does not cover it", key="time", value=time, expected=f"{first:g} s to {last:g} s"
+            )

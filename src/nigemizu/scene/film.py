@@ -1,0 +1,181 @@
+"""The film: the air streams past, instant by instant, and every frame that is not there yet is rendered."""
+
+from __future__ import annotations
+
+import functools
+import multiprocessing
+import os
+import signal
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from nigemizu.errors import MachineError
+from nigemizu.progress import SILENT, ProgressMeter
+from nigemizu.scene.rendering import Studio, warn_of_lost_rays
+from nigemizu.scene.running import AirSource, AirVolume, air_instants, open_air, require_within
+
+if TYPE_CHECKING:
+    from nigemizu.output import FrameFolder
+    from nigemizu.scene.model import Scene
+
+__all__ = ["animate", "frames_folder"]
+
+_Job: TypeAlias = tuple[int, AirVolume | None, Path]
+
+
+def animate(
+    scene: Scene, path: Path, air: AirSource, workers: int, variant: str, command: str, progress: ProgressMeter
+) -> Path:
+    """See `nigemizu.scene.Scene.animate`."""
+    from nigemizu.output import FrameFolder, Provenance, ready_to_write, write_film
+
+    scene.check()
+    path = ready_to_write(path, (".mp4", ".gif", ".webp"))
+    _require_instants(scene, air)
+    provenance = Provenance(scene=scene.to_toml(), command=command)
+    # How fast the film plays, and what it is called, changes no frame.
+    shown = scene.model_copy(
+        update={"title": "", "description": "", "film": scene.film.model_copy(update={"fps": 1})}
+    )
+    inputs = {"air": str(air)} if isinstance(air, str | os.PathLike) else None
+    folder = FrameFolder(
+        frames_folder(path), scene.film.frames, Provenance(scene=shown.to_toml()), inputs=inputs
+    )
+    missing = folder.missing()
+    progress.start("frames", folder.count)
+    progress.advance(folder.count - len(missing))
+    jobs = _jobs(scene, folder, missing, air)
+    if workers == 1:
+        statuses = _render_here(scene, jobs, variant, progress)
+    else:
+        statuses = _render_in_processes(scene, jobs, variant, workers, progress)
+    progress.finish()
+    warn_of_lost_rays(statuses, scene)
+    return write_film(path, folder.frames(), fps=scene.film.fps, provenance=provenance, progress=progress)
+
+
+def frames_folder(path: Path) -> Path:
+    """Where the numbered frames of the film `path` lie."""
+    return path.with_name(f"{path.stem}_frames")
+
+
+def _require_instants(scene: Scene, air: AirSource) -> None:
+    """Refuse what cannot be shown before the first frame is rendered and anything is written."""
+    if isinstance(air, AirVolume):
+        return
+    if air is not None:
+        require_within(open_air(air), scene.film.times)
+    elif scene.tracer.method != "straight":
+        scene.initial.sample(scene.grid.build())
+
+
+def _jobs(scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSource) -> Iterator[_Job]:
+    """The frames that are missing, with their air.
+
+    The heat stage runs from the beginning even when only the last frame is missing: a frame is the same
+    whether the film was interrupted before it or not.
+    """
+    if not missing:
+        return
+    if scene.tracer.method == "straight":
+        yield from ((index, None, folder.frame(index)) for index in missing)
+        return
+    wanted = frozenset(missing)
+    times = scene.film.times[: missing[-1] + 1]
+    for index, volume in enumerate(air_instants(scene, times, air, SILENT)):
+        if index in wanted:
+            yield index, volume, folder.frame(index)
+
+
+def _render_here(
+    scene: Scene, jobs: Iterator[_Job], variant: str, progress: ProgressMeter
+) -> Counter[str]:
+    studio: Studio | None = None
+    statuses: Counter[str] = Counter()
+    for index, air, frame in jobs:
+        studio = studio or Studio(scene, variant)
+        picture = studio.shoot(air, frame=index, progress=progress)
+        picture.save(frame)
+        statuses.update(picture.statuses)
+        progress.advance()
+    return statuses
+
+
+def _render_in_processes(
+    scene: Scene, jobs: Iterator[_Job], variant: str, workers: int, progress: ProgressMeter
+) -> Counter[str]:
+    """Few instants are under way at once, so that the air of a long film is never held as a whole."""
+    threads = max(1, (os.cpu_count() or 1) // workers)
+    toml = scene.to_toml()
+    statuses: Counter[str] = Counter()
+    with _pool(workers) as pool:
+        waiting: set[Future[dict[str, int]]] = set()
+        for job in jobs:
+            if len(waiting) >= 2 * workers:
+                waiting = _collect(waiting, statuses, progress)
+            waiting.add(pool.submit(_render_one, toml, variant, threads, job))
+        while waiting:
+            waiting = _collect(waiting, statuses, progress)
+    return statuses
+
+
+def _collect(
+    waiting: set[Future[dict[str, int]]], statuses: Counter[str], progress: ProgressMeter
+) -> set[Future[dict[str, int]]]:
+    done, rest = wait(waiting, return_when=FIRST_COMPLETED)
+    for future in done:
+        try:
+            statuses.update(future.result())
+        except BrokenProcessPool as error:
+            raise MachineError(
+                "a rendering process was killed, perhaps for want of memory; use fewer --workers"
+            ) from error
+        progress.advance()
+    return rest
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
+    # Spawned, not forked: neither Mitsuba nor the compiler's threads survive a fork.
+    context = multiprocessing.get_context("spawn")
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_prepare_process)
+    finished = False
+    try:
+        yield pool
+        finished = True
+    finally:
+        if not finished:
+            # Frames are written whole or not at all, so that their renderers need not be waited for.
+            for process in set(multiprocessing.active_children()) - others:
+                process.terminate()
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _prepare_process() -> None:
+    # Ctrl-C reaches every process of a terminal; the parent decides for all, and speaks for all.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    warnings.simplefilter("ignore")
+
+
+def _render_one(toml: str, variant: str, threads: int, job: _Job) -> dict[str, int]:
+    index, air, frame = job
+    picture = _studio(toml, variant, threads).shoot(air, frame=index)
+    picture.save(frame)
+    return picture.statuses
+
+
+@functools.cache
+def _studio(toml: str, variant: str, threads: int) -> Studio:
+    import drjit
+
+    from nigemizu.scene.model import Scene
+
+    drjit.set_thread_count(threads)
+    return Studio(Scene.from_toml(toml), variant)
