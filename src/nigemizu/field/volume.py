@@ -86,10 +86,12 @@ class TrilinearVolume(BoxedField):
 
         self._base_height = float(nodes[2][0])
         self._top_height = float(nodes[2][-1])
-        intercept, self._slope = _linear_background(nodes[2], data)
-        self._base_index = 1.0 + intercept
+        intercept, slope = _linear_background(nodes[2], data)
         height = (nodes[2] - self._base_height)[:, None, None]
-        deviation = data - (intercept + self._slope * height)
+        deviation = data - (intercept + slope * height)
+        # Opaque: the next instant's values are not compiled into the kernel, which serves them all.
+        self._base_index = dr.opaque(types.Float, 1.0 + intercept)
+        self._slope = dr.opaque(types.Float, slope)
         self._stored: Precision = storage or types.precision
         dtype = np.float32 if self._stored == "single" else np.float64
         self._voxel_type = types.storage(self._stored)

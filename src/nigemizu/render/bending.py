@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, final
+from typing import Any, Literal, final
 
 import drjit as dr
 import mitsuba as mi
@@ -211,6 +211,7 @@ def medium_of(
     refractivity: NDArray[np.float64],
     *,
     tracer: trace.Tracer,
+    precision: Literal["single", "double"] = "single",
 ) -> Any:
     """Air on a grid as what the tracer's method wants: a volume, or panes cut from its mean profile.
 
@@ -222,8 +223,10 @@ def medium_of(
         n − 1.
     tracer : Tracer
         Method, what lies beyond the sides, and the panes.
+    precision : {"single", "double"}
+        Single for pictures, double for rays as data.
     """
-    types = field.types(current_backend(), "single", differentiable=True)
+    types = field.types(current_backend(), precision, differentiable=True)
     if tracer.method == "layered":
         return field.Layers.from_profile(
             z,

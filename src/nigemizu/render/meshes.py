@@ -138,19 +138,19 @@ def pyramid(shape: Pyramid, course: float | None, seed: int) -> Triangles:
 def hills(shape: Hills) -> Triangles:
     """A ridge whose outline is a random walk through all scales, falling to the plain on both sides."""
     rng = np.random.default_rng(np.random.SeedSequence(shape.seed))
-    columns, rows = 1024, 24
+    columns, rows = 1024, 25  # odd: one row runs along the crest
     spread = math.radians(shape.spread)
     azimuth = math.radians(shape.azimuth) + np.linspace(-0.5, 0.5, columns) * spread
     across = np.linspace(-1.0, 1.0, columns)
     depth = np.linspace(-1.0, 1.0, rows)
     length = shape.distance * spread
-    crest = _fractal(rng, columns, length / max(6 * shape.height, 1.0), 1.15)
+    crest = _fractal(rng, columns, length / max(6 * shape.height, 1.0), 1.9)
     crest = 0.62 + 0.26 * crest
     envelope = np.ones(columns) if shape.spread > 350 else (1 - np.abs(across) ** 2.5) ** 0.8
     outline = np.maximum(envelope * crest, 0.0)
     outline *= shape.height / outline.max()
     # Gullies and spurs: the slope runs down unevenly, and the crest wanders in depth.
-    relief = np.stack([_fractal(rng, columns, length / (2 * shape.height), 0.9) for _ in range(rows)])
+    relief = np.stack([_fractal(rng, columns, length / (2 * shape.height), 1.6) for _ in range(rows)])
     relief = (relief + np.roll(relief, 1, axis=0) + np.roll(relief, -1, axis=0)) / 3
     profile = np.maximum(0.0, 1 - np.abs(depth)) ** 1.3
     uneven = 1 + 0.35 * relief * (4 * profile * (1 - profile))[:, None]

@@ -62,7 +62,7 @@ def car() -> dict[str, list[Triangles]]:
             outer, inner = np.array([x, 0.87 * side, 0.32]), np.array([x, 0.64 * side, 0.32])
             parts["rubber"].append(cylinder(inner, outer, 0.32))
             parts["metal"].append(cylinder(outer, outer + np.array([0, 0.012 * side, 0]), 0.2))
-            arch = np.array([x, 0.60 * side, 0.34]), np.array([x, 0.885 * side, 0.34])
+            arch = np.array([x, 0.60 * side, 0.38]), np.array([x, 0.885 * side, 0.38])
             parts["dark"].append(cylinder(*arch, 0.37))
         parts["lamp"].append(ellipsoid((2.06, 0.62 * side, 0.66), (0.11, 0.17, 0.07)))
         parts["tail"].append(ellipsoid((-2.14, 0.66 * side, 0.82), (0.06, 0.14, 0.08)))
