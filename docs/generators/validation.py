@@ -77,7 +77,7 @@ def _refractivity() -> list[Case]:
             celsius + 273.15, pressure, relative_humidity=humidity, wavelength=wavelength
         )
         what = f"n − 1 at {celsius} °C, {pressure / 1000:g} kPa, {humidity:.0%}, {wavelength * 1e9:.0f} nm"
-        cases.append(Case(what, source, expected, float(obtained), allowed, 1e-8, "1e-8"))
+        cases.append(Case(what, source, expected, float(obtained), allowed, 1e-8, "× 10⁻⁸"))
     return cases
 
 
