@@ -24,6 +24,9 @@ SPECTRUM_END: Final = 5.0
 LATTICE: Final = 0.5
 """Spacing of the vertical noise lattice in correlation lengths; the sum then equals the integral to 1e-8."""
 
+REACH: Final = 11
+"""Points of that lattice beyond a height that still count there: the weight of the next one is 2e-16."""
+
 
 @final
 class Unevenness(Value):
@@ -79,7 +82,7 @@ class Unevenness(Value):
 
         # vertical: white noise on a lattice, weighted by the square root of the covariance
         spacing = LATTICE * self.length[2]
-        lattice = np.arange(-8, math.ceil(grid.z_edges[-1] / spacing) + 9) * spacing
+        lattice = np.arange(-REACH, math.ceil(grid.z_edges[-1] / spacing) + REACH + 1) * spacing
         smoothing = np.exp(-(((grid.z[:, None] - lattice) / self.length[2]) ** 2))
         smoothing /= np.sqrt(np.sum(smoothing**2, axis=1, keepdims=True))
 
@@ -103,7 +106,7 @@ class Unevenness(Value):
         wrap = np.ix_(my % ny, mx % nx)
         for level in range(lattice.size):
             pairs = generator.standard_normal((2, my.size, mx.size))
-            near = np.flatnonzero(smoothing[:, level] > 1e-12)
+            near = np.flatnonzero(smoothing[:, level] > 1e-14)
             if near.size == 0:
                 continue
             amplitudes = np.zeros((ny, nx), dtype=np.complex128)
