@@ -11,12 +11,16 @@ import os
 import platform
 import shutil
 import sys
-from typing import Any
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
 
-__all__ = ["examine", "report"]
+from nigemizu.errors import MachineError
 
-OLDEST_LLVM = 16
-_PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "numba", "xarray", "zarr", "netCDF4", "pydantic", "av", "matplotlib")
+__all__ = ["demand_backend", "examine", "find_backends", "report"]
+
+OLDEST_LLVM: Final = 16
+_PACKAGES: Final = ("mitsuba", "drjit", "numpy", "scipy", "numba", "xarray", "zarr", "netCDF4", "pydantic", "av", "matplotlib")
 
 
 def examine() -> dict[str, Any]:
@@ -29,8 +33,8 @@ def examine() -> dict[str, Any]:
     """
     from nigemizu.scene.memory import memory_available
 
-    version, cuda = _llvm_version(), _cuda()
-    state = "missing" if version is None else "too old" if version[0] < OLDEST_LLVM else "found"
+    version, cuda = find_backends()
+    state = _llvm_state(version)
     can_render = state == "found" or cuda
     return {
         "nigemizu": importlib.metadata.version("nigemizu"),
@@ -71,28 +75,64 @@ def report(found: dict[str, Any]) -> str:
     return "\n".join(f"{name:9} {text}" for name, text in rows)
 
 
-def _llvm_version() -> tuple[int, ...] | None:
+def find_backends() -> tuple[tuple[int, ...] | None, bool]:
+    """Version of LLVM (None: missing) and whether CUDA is usable.
+
+    Dr.Jit complains about what it does not find straight to the process's stderr, in its own words; nigemizu
+    says it in one line, so those words are kept away.
+    """
     import drjit
 
-    if not drjit.has_backend(drjit.JitBackend.LLVM):
-        return None
-    version = drjit.detail.llvm_version()
-    return tuple(int(part) for part in str(version).strip("()").replace(",", ".").split(".") if part.strip())
+    with _hushed():
+        llvm, cuda = drjit.has_backend(drjit.JitBackend.LLVM), drjit.has_backend(drjit.JitBackend.CUDA)
+    return (drjit.detail.llvm_version() if llvm else None), bool(cuda)
 
 
-def _cuda() -> bool:
-    import drjit
+def demand_backend(variant: str) -> None:
+    """Refuse to go on where nothing can compile the rays.
 
-    return bool(drjit.has_backend(drjit.JitBackend.CUDA))
+    Raises
+    ------
+    MachineError
+        With what is missing and the line to type.
+    """
+    version, cuda = find_backends()
+    if variant == "cuda" and not cuda:
+        raise MachineError("no usable NVIDIA graphics card and driver; use --variant llvm")
+    if variant == "cuda" or (variant == "auto" and cuda):
+        return
+    state = _llvm_state(version)
+    if state == "missing":
+        raise MachineError(f"LLVM {OLDEST_LLVM} or newer is needed and none was found; {_remedy(state)}")
+    if version is not None and state == "too old":
+        shown = ".".join(map(str, version))
+        raise MachineError(f"LLVM {shown} is too old, {OLDEST_LLVM} or newer is needed; {_remedy(state)}")
+
+
+def _llvm_state(version: tuple[int, ...] | None) -> str:
+    return "missing" if version is None else "too old" if version[0] < OLDEST_LLVM else "found"
+
+
+@contextmanager
+def _hushed() -> Iterator[None]:
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def _remedy(state: str) -> str:
     if sys.platform == "darwin":
-        return "brew install llvm"
+        return "type: brew install llvm"
     if shutil.which("apt-get"):
-        return "sudo apt-get install libllvm19"
+        return "type: sudo apt-get install libllvm19"
     if shutil.which("dnf"):
-        return "sudo dnf install llvm-libs"
+        return "type: sudo dnf install llvm-libs"
     verb = "install" if state == "missing" else "update"
     return f"{verb} LLVM {OLDEST_LLVM} or newer and set DRJIT_LIBLLVM_PATH to its shared library"
 

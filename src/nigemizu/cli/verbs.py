@@ -32,11 +32,13 @@ _FLAG_KEYS = {
 
 def render(options: argparse.Namespace) -> int:
     """``nigemizu render``."""
+    from nigemizu.cli.doctor import demand_backend
     from nigemizu.output import ready_to_write
 
     scene = _scene(options)
     common: dict[str, Any] = {"time": options.time, "air": options.air, "variant": options.variant}
     output = ready_to_write(_output(options, ".png"), (".png",) if options.compare else (".png", ".exr"))
+    demand_backend(options.variant)
     _use_threads(options.threads)
     with _naming(options.scene), meter(quiet=options.quiet) as progress:
         if options.compare:
@@ -50,7 +52,10 @@ def render(options: argparse.Namespace) -> int:
 
 def animate(options: argparse.Namespace) -> int:
     """``nigemizu animate``."""
+    from nigemizu.cli.doctor import demand_backend
+
     scene = _scene(options)
+    demand_backend(options.variant)
     _use_threads(options.threads)
     with _naming(options.scene), meter(quiet=options.quiet) as progress:
         written = scene.animate(
@@ -80,6 +85,7 @@ def simulate(options: argparse.Namespace) -> int:
 
 def trace(options: argparse.Namespace) -> int:
     """``nigemizu trace``."""
+    from nigemizu.cli.doctor import demand_backend
     from nigemizu.output import ready_to_write
 
     scene = _scene(options)
@@ -87,6 +93,7 @@ def trace(options: argparse.Namespace) -> int:
         ready_to_write(options.output, (".csv", ".nc", ".png", ".svg"))
     elif not options.json:
         raise InputError("nothing to write", key="trace", remedy="add --json, or -o rays.svg (.png, .csv, .nc)")
+    demand_backend(options.variant)
     _use_threads(options.threads)
     with _naming(options.scene), meter(quiet=options.quiet) as progress:
         rays = scene.trace(

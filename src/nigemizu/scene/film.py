@@ -34,8 +34,10 @@ def animate(
 ) -> Path:
     """See `nigemizu.scene.Scene.animate`."""
     from nigemizu.output import FrameFolder, Provenance, ready_to_write, write_film
+    from nigemizu.render import select_variant
 
     scene.check()
+    select_variant(variant)  # refused here, before anything is written
     path = ready_to_write(path, (".mp4", ".gif", ".webp"))
     _require_instants(scene, air)
     provenance = Provenance(scene=scene.to_toml(), command=command)
