@@ -7,6 +7,7 @@ export PYTHON
 
 run:  ## set up, then render the scene to out/pyramid.png (SCENE=road for another one)
 	@tools/setup
+	@mkdir -p out
 	@$(BIN)/nigemizu render $(SCENE) -o out/$(SCENE).png
 
 test:  ## set up, then check format, lint, types and run the tests
@@ -18,6 +19,7 @@ test:  ## set up, then check format, lint, types and run the tests
 
 film:  ## set up, then render the film of the hot road to out/road.mp4
 	@tools/setup
+	@mkdir -p out
 	@$(BIN)/nigemizu animate road -o out/road.mp4
 
 bench:  ## set up, then measure the speed of each stage on this machine
