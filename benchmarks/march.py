@@ -87,17 +87,17 @@ def by_hand(types: field.Types, voxels: Any, origin: Any, direction: Any, steps:
     return x
 
 
-def best_time(work: Callable[[], Any], repeat: int) -> float:
-    """Least seconds of several runs, the compilation left out."""
-    dr.eval(work())
-    dr.sync_thread()
-    times = []
-    for _ in range(repeat):
-        start = time.perf_counter()
-        dr.eval(work())
-        dr.sync_thread()
-        times.append(time.perf_counter() - start)
-    return min(times)
+def best_times(works: list[Callable[[], Any]], repeat: int) -> list[float]:
+    """Least seconds of several runs of each piece of work, taken in turns; the compilation left out."""
+    times: list[list[float]] = [[] for _ in works]
+    for turn in range(repeat + 1):
+        for work, kept in zip(works, times, strict=True):
+            start = time.perf_counter()
+            dr.eval(work())
+            dr.sync_thread()
+            if turn > 0:
+                kept.append(time.perf_counter() - start)
+    return [min(kept) for kept in times]
 
 
 def measure(count: int, steps: int, repeat: int) -> dict[str, dict[str, float]]:
@@ -118,8 +118,7 @@ def measure(count: int, steps: int, repeat: int) -> dict[str, dict[str, float]]:
     origin, direction = rays(single, count)
     marched = len(direction.x) * steps / 1e6
     results = {}
-    hand = marched / best_time(lambda: by_hand(single, voxels, origin, direction, steps), repeat)
-    results["by hand"] = {"million_ray_steps_per_second": hand, "ratio": 1.0}
+    hand = 0.0
     for name, (types, z, options) in cases.items():
         volume = field.TrilinearVolume(x, y, z, air(z), types, storage="single")
         start, ahead = rays(types, count)
@@ -130,11 +129,12 @@ def measure(count: int, steps: int, repeat: int) -> dict[str, dict[str, float]]:
             return trace.march(volume, start, ahead, step=STEP, max_steps=steps, **options)
 
         made = float(np.sum(np.array(work().steps), dtype=np.float64)) / 1e6
-        speed = made / best_time(work, repeat)
-        # Once more, so that a load that came and went does not decide the ratio.
-        hand = marched / best_time(lambda: by_hand(single, voxels, origin, direction, steps), repeat)
-        results[name] = {"million_ray_steps_per_second": speed, "ratio": speed / hand}
-    return results
+        # In turns with the loop by hand, so that a load that comes and goes does not decide the ratio.
+        ours, theirs = best_times([work, lambda: by_hand(single, voxels, origin, direction, steps)], repeat)
+        speed, here = made / ours, marched / theirs
+        results[name] = {"million_ray_steps_per_second": speed, "ratio": speed / here}
+        hand = max(hand, here)
+    return {"by hand": {"million_ray_steps_per_second": hand, "ratio": 1.0}, **results}
 
 
 def main() -> None:

@@ -15,7 +15,7 @@ from nigemizu.field.types import Types
 __all__ = ["Axis", "BucketAxis", "UniformAxis", "make_axis"]
 
 UNIFORM_TOLERANCE: Final = 1e-6  # of the spacing: below what single precision can tell from uniform
-MOST_BUCKETS: Final = 1 << 20
+MOST_BUCKETS: Final = 1 << 17
 FEW_CORRECTIONS: Final = 1  # nodes allowed inside one bucket before the buckets are made finer
 
 
@@ -62,10 +62,13 @@ class UniformAxis(Axis):
 
 @final
 class BucketAxis(Axis):
-    """Nodes with any spacing: a table over equal buckets gives a cell, comparisons make it exact.
+    """Nodes with any spacing: a table over buckets gives a cell, comparisons make it exact.
 
-    The table holds, per bucket, the last node at or before its lower edge. A coordinate in the bucket
-    then passes at most `corrections` further nodes, each found by one comparison.
+    The bucket of x is the leading bits of the floating-point number x − x₀ + c. Such buckets are equal
+    within a factor of two and widen with x, as stretched meshes do: a few hundred serve a mesh from
+    millimetres to metres, and the table stays in the fastest cache. The table holds, per bucket, the last
+    node at or before its lower edge. A coordinate in the bucket then passes at most `corrections` further
+    nodes, each found by one comparison.
     """
 
     def __init__(self, nodes: NDArray[np.float64], types: Types) -> None:
@@ -77,8 +80,10 @@ class BucketAxis(Axis):
             raise InputError(
                 "the axis has cells too thin for single precision", remedy="use double precision"
             )
-        self._buckets, table, self.corrections = _bucket_table(stored)
-        self._scale = self._buckets / (self._last - self._first)
+        table, self._offset, self._shift, self.corrections = _best_table(stored)
+        self._origin = float(stored[0])
+        self._key = int(_key(np.float32(self._offset), self._shift))
+        self.buckets = len(table)
         self._table = types.UInt32(table)
         self._nodes = types.Float(stored)
         self._inverse_widths = types.Float((1.0 / np.diff(nodes)).astype(dtype))
@@ -86,8 +91,10 @@ class BucketAxis(Axis):
     def locate(self, coordinate: Any, active: Any = True) -> tuple[Any, Any, Any]:
         types = self._types
         x = dr.clip(coordinate, self._first, self._last)
-        bucket = types.UInt32(dr.maximum((x - self._first) * self._scale, 0))
-        index = dr.gather(types.UInt32, self._table, dr.minimum(bucket, self._buckets - 1), active)
+        raised = types.Float32(x - self._origin) + self._offset
+        bits: Any = dr.reinterpret_array(types.UInt32, raised)
+        bucket = dr.minimum((bits >> self._shift) - self._key, self.buckets - 1)
+        index = dr.gather(types.UInt32, self._table, bucket, active)
         for _ in range(self.corrections):
             above = dr.gather(types.Float, self._nodes, index + 1, active)
             index = dr.select((x >= above) & (index < self._cells - 1), index + 1, index)
@@ -110,18 +117,43 @@ def make_axis(nodes: ArrayLike, types: Types, *, key: str) -> Axis:
     return BucketAxis(values, types)
 
 
-def _bucket_table(nodes: NDArray[Any]) -> tuple[int, NDArray[np.uint32], int]:
-    """Number of buckets, cell at the lower edge of each, and the most nodes that one bucket can pass."""
-    first, last = float(nodes[0]), float(nodes[-1])
+def _key(raised: Any, shift: int) -> Any:
+    """Leading bits of single-precision numbers."""
+    return np.asarray(raised, dtype=np.float32).view(np.uint32) >> shift
+
+
+def _best_table(nodes: NDArray[Any]) -> tuple[NDArray[np.uint32], float, int, int]:
+    """The shortest table that needs few corrections, with its offset c [m], shift and corrections."""
+    span = float(nodes[-1]) - float(nodes[0])
+    thinnest = float(np.diff(nodes.astype(np.float64)).min())
+    offsets = [thinnest * 2.0**power for power in range(int(np.log2(span / thinnest)) + 3)]
+    best: tuple[NDArray[np.uint32], float, int, int] | None = None
+    for shift in range(22, 7, -1):
+        for offset in offsets:
+            ends = np.array([offset, 1.0001 * (span + offset)], dtype=np.float32)
+            if int(np.subtract(*_key(ends[::-1], shift).astype(np.int64))) >= MOST_BUCKETS:
+                continue
+            table, corrections = _bucket_table(nodes, float(ends[0]), shift, float(ends[1]))
+            if best is None or corrections < best[3]:
+                best = table, float(ends[0]), shift, corrections
+            if corrections <= FEW_CORRECTIONS:
+                return table, float(ends[0]), shift, corrections
+    assert best is not None  # the coarsest shift has a handful of buckets
+    return best
+
+
+def _bucket_table(
+    nodes: NDArray[Any], offset: float, shift: int, top: float
+) -> tuple[NDArray[np.uint32], int]:
+    """Cell at the lower edge of each bucket, and the most nodes that one bucket can pass."""
+    first, last = (int(_key(np.float32(value), shift)) for value in (offset, top))
+    keys = np.arange(first, last + 2, dtype=np.uint32)
+    raised = (keys << np.uint32(shift)).view(np.float32).astype(np.float64)
+    # Round-off may put a coordinate into the neighbouring bucket: look beyond the edges by as much.
+    reach = max(abs(float(nodes[0])), abs(float(nodes[-1])))
+    slack = 4 * np.finfo(np.float32).eps * raised + 4 * np.finfo(nodes.dtype).eps * reach
+    edges = raised - offset + float(nodes[0])
     cells = len(nodes) - 1
-    buckets = 1 << max(6, int(np.ceil(np.log2(2 * cells))))
-    while True:
-        edges = first + (last - first) * np.arange(buckets + 1) / buckets
-        # Round-off may put a coordinate one bucket off: look one bucket's slack to either side.
-        slack = 4 * np.finfo(nodes.dtype).eps * max(abs(first), abs(last), last - first)
-        start = np.clip(np.searchsorted(nodes, edges[:-1] - slack, side="right") - 1, 0, cells - 1)
-        end = np.clip(np.searchsorted(nodes, edges[1:] + slack, side="right") - 1, 0, cells - 1)
-        corrections = int(np.max(end - start))
-        if corrections <= FEW_CORRECTIONS or 2 * buckets > MOST_BUCKETS:
-            return buckets, start.astype(np.uint32), corrections
-        buckets *= 2
+    start = np.clip(np.searchsorted(nodes, (edges - slack)[:-1], side="right") - 1, 0, cells - 1)
+    end = np.clip(np.searchsorted(nodes, (edges + slack)[1:], side="right") - 1, 0, cells - 1)
+    return start.astype(np.uint32), int(np.max(end - start))
