@@ -115,7 +115,7 @@ def read_air(source: str | Path | xr.Dataset) -> xr.Dataset:
             f"{main} has no height axis", file=name, key=main, value=tuple(dataset[found[main]].dims)
         )
     try:
-        result = xr.merge(list(renamed.values()), join="exact", compat="equals", combine_attrs="drop")
+        result = xr.merge(list(renamed.values()), join="exact", compat="equals", combine_attrs="override")
     except (ValueError, xr.MergeError) as error:
         raise InputError(
             "the variables lie on different axes",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -118,15 +119,26 @@ def _write_netcdf(file: Path, first: xr.Dataset, later: Iterator[xr.Dataset], ta
 
     timed = ["time"] if "time" in first.dims else []
     encoding = _encoding(first, zlib=True, complevel=1, shuffle=True)
-    try:
+    with _hdf5_errors(target):
         first.drop_encoding().to_netcdf(
             file, engine="netcdf4", format="NETCDF4", unlimited_dims=timed, encoding=encoding
         )
-        with netCDF4.Dataset(file, "a") as store:
-            for index, instant in enumerate(later, start=1):
-                new = _later(first, instant)
+        store = netCDF4.Dataset(file, "a")
+    try:
+        for index, instant in enumerate(later, start=1):
+            new = _later(first, instant)
+            with _hdf5_errors(target):
                 for name, variable in new.variables.items():
                     if "time" in variable.dims:
                         store[str(name)][index] = np.asarray(variable.values)[0]
+    finally:
+        with _hdf5_errors(target):
+            store.close()
+
+
+@contextmanager
+def _hdf5_errors(target: Path) -> Iterator[None]:
+    try:
+        yield
     except RuntimeError as error:  # the HDF5 library has no better word for a full or failing disk
         raise MachineError(f"{target}: writing failed: {error}; is the disk full?") from error

@@ -132,7 +132,9 @@ def vanishing_line(rays: Sequence[DiagramRay], *, samples: int = 400) -> tuple[F
     # Where the lowest ray meets an object the line ends; what is higher up goes on, but limits nothing.
     stopped = ~np.isfinite(heights[nearest[:-1], np.arange(1, samples)])
     length = int(np.argmax(stopped)) + 1 if stopped.any() else samples
-    seen = np.isfinite(lowest) & (np.arange(samples) < length)
+    # Up to where the limiting ray comes down the ground is seen; there the line begins.
+    place = np.arange(samples)
+    seen = np.isfinite(lowest) & (place < length) & (place >= int(np.argmin(lowest[:length])))
     return distances[seen], lowest[seen]
 
 
@@ -272,7 +274,8 @@ def _draw_objects(axes: Axes, objects: Sequence[Outline], upper: float) -> None:
         middle = float(0.5 * (np.min(outline.x) + np.max(outline.x)))
         axes.annotate(
             outline.name,
-            (middle, upper if clipped else highest),
+            gid=f"object {outline.name}",
+            xy=(middle, upper if clipped else highest),
             xytext=(0, -6 if clipped else 4),
             textcoords="offset points",
             ha="center",
@@ -326,7 +329,8 @@ def _finish(
     axes.plot(*eye, marker="o", ms=7, mfc="white", mec=_INK, mew=1.5, zorder=7)
     axes.annotate(
         "eye",
-        eye,
+        gid="eye",
+        xy=eye,
         xytext=(4, 8),
         textcoords="offset points",
         weight="bold",

@@ -1,0 +1,133 @@
+"""The ray diagram: what is drawn, from rays whose shape is known."""
+
+import re
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from nigemizu.errors import InputError
+from nigemizu.output import DiagramRay, Outline, Profile, Provenance, ray_diagram, vanishing_line
+
+X = np.linspace(0.0, 600.0, 1201)
+EYE = 1.6
+
+
+def ray(slope, curvature=2e-5):
+    """z = eye + s x + c x²/2: the paraxial ray in a constant gradient, cut where it meets the ground."""
+    z = EYE + slope * X + 0.5 * curvature * X**2
+    hits = np.flatnonzero(z < 0.0)
+    if hits.size:
+        last = int(hits[0])
+        return DiagramRay(np.append(X[:last], X[last]), np.append(z[:last], 0.0), "hit")
+    return DiagramRay(X, z, "escaped")
+
+
+BUNDLE = [ray(slope) for slope in np.linspace(-0.012, 0.002, 141)]
+PROFILE = Profile(np.linspace(0, 5, 51), np.linspace(2.4e-4, 2.6e-4, 51), np.linspace(330, 300, 51))
+PYRAMID = Outline("pyramid", np.array([400.0, 480.0, 560.0]), np.array([0.0, 30.0, 0.0]))
+
+
+def test_kinds_of_rays():
+    assert ray(-0.012).kind() == "direct"
+    assert ray(-0.005).kind() == "turned"
+    assert ray(0.002).kind() == "sky"
+    assert ray(-0.001, curvature=0.0).kind() == "sky"
+    assert DiagramRay(X, EYE + 0 * X, "out-of-steps").kind() == "lost"
+
+
+def test_vanishing_line_is_the_envelope():
+    """The limiting ray grazes the ground: s = -sqrt(2 c z_eye), at x0 = sqrt(2 z_eye/c) = 400 m.
+
+    Beyond it the lowest ray is that one, z = c (x - x0)²/2; the bundle is 0.1 mrad fine and holds it.
+    """
+    x, z = vanishing_line(BUNDLE)
+    assert x[0] == pytest.approx(400.0, abs=1.0)
+    assert x[-1] == pytest.approx(600.0)
+    assert z == pytest.approx(0.5 * 2e-5 * (x - 400.0) ** 2, abs=1e-4)
+
+
+def test_vanishing_line_ends_at_an_object():
+    cut = [
+        DiagramRay(one.x[one.x <= 500.0], one.z[one.x <= 500.0], "hit") if one.x[-1] > 500.0 else one
+        for one in BUNDLE
+    ]
+    x, _ = vanishing_line([*cut, DiagramRay(X, 5.0 + 0 * X, "escaped")])
+    assert x[-1] == pytest.approx(500.0, abs=1.0)
+
+
+def test_no_vanishing_line_where_all_is_ground():
+    x, z = vanishing_line([ray(-0.02), ray(-0.03)])
+    assert x.size == z.size == 0
+
+
+def texts(path):
+    words = path.read_text(encoding="utf-8")
+    ElementTree.fromstring(words)  # well-formed
+    # Each text is drawn as outlines: with itself as a comment, or with a halo and its identifier.
+    return re.findall(r"<!-- (.*?) -->", words) + re.findall(r'<g id="(.*?)"', words)
+
+
+def test_everything_is_named(tmp_path):
+    path = ray_diagram(
+        tmp_path / "rays.svg",
+        rays=BUNDLE,
+        profile=PROFILE,
+        objects=[PYRAMID],
+        vanishing=vanishing_line(BUNDLE),
+        title="Hot sand",
+        provenance=Provenance(scene="a = 1"),
+    )
+    words = texts(path)
+    for expected in (
+        "Hot sand",
+        "object pyramid",
+        "eye",
+        "distance (m)",
+        "height above the ground (m)",
+        "temperature (°C)",
+        "vanishing line: below it nothing is seen",
+        "turned back up by the hot air",
+        "to the ground or an object",
+        "to the sky",
+    ):
+        assert expected in words
+    assert any(word.startswith("heights ×") for word in words)
+    assert "a = 1" in path.read_text(encoding="utf-8")
+
+
+def test_parts_may_be_left_out(tmp_path):
+    words = texts(ray_diagram(tmp_path / "rays.svg", rays=[ray(0.002)]))
+    assert "temperature (°C)" not in words
+    assert "to the ground or an object" not in words
+    assert "height above the ground (m)" in words
+
+
+def test_colours_reach_the_picture(tmp_path):
+    path = ray_diagram(tmp_path / "rays.png", rays=BUNDLE, profile=PROFILE, top=5.0)
+    with Image.open(path) as image:
+        assert image.size == (1680, 800)
+        assert image.text["Software"].startswith("nigemizu ")
+        pixels = np.asarray(image.convert("RGB")).astype(int)[150:650, 420:1600]
+    for colour in ((0xC8, 0x44, 0x2B), (0x2A, 0x6F, 0x97), (0x8F, 0xB3, 0xC9)):
+        assert (np.abs(pixels - colour).max(axis=-1) < 40).sum() > 300
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png", ".pdf"])
+def test_equal_rays_give_equal_bytes(tmp_path, suffix):
+    first, second = (
+        ray_diagram(tmp_path / f"{name}{suffix}", rays=BUNDLE[::20], profile=PROFILE).read_bytes()
+        for name in "ab"
+    )
+    assert first == second
+
+
+def test_refused(tmp_path):
+    with pytest.raises(InputError, match=r"\.jpg.*expected \.svg, \.png or \.pdf"):
+        ray_diagram(tmp_path / "rays.jpg", rays=BUNDLE)
+    with pytest.raises(InputError, match="no rays to draw"):
+        ray_diagram(tmp_path / "rays.svg", rays=[])
+    (tmp_path / "file").write_text("a file")
+    with pytest.raises(InputError, match="Not a directory"):
+        ray_diagram(tmp_path / "file" / "rays.svg", rays=[ray(0.002)])
