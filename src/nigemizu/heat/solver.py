@@ -118,7 +118,8 @@ def evolve(
     Every part is a mean with non-negative weights, or limited so that no new extrema arise: for any step,
     each value lies between those in the air and at its walls (a flux excepted). Heat is conserved to
     round-off between insulated or periodic walls; a flux adds exactly its integral, taken linear in each
-    step. Second order in step and cell where the temperature is smooth.
+    step. Second order in step and cell where the temperature is smooth; the transport alone has order 2.5 in
+    the mean error (5 away from extrema, where nothing is clipped).
 
     Limits: no buoyancy, no radiation, no vertical wind. Schedules are linear within a step. A ground pattern
     is as sharp as the cells. The limiter flattens peaks narrower than about four cells.
@@ -148,20 +149,19 @@ def _march(
     counts = [_steps(float(interval), longest) for interval in intervals]
     progress.start("heat", sum(counts))
     time = start
-    with stepper:
-        for instant, count in zip(instants, counts, strict=True):
-            for number in range(count):
-                step = (instant - time) / count
-                stepper.advance(
-                    time + number * step,
-                    time + (number + 1) * step if number + 1 < count else instant,
-                    opens=number == 0,
-                    closes=number + 1 == count,
-                )
-                progress.advance()
-            time = instant
-            yield stepper.state(time)
-    progress.finish()
+    try:
+        with stepper:
+            for instant, count in zip(instants, counts, strict=True):
+                step = (instant - time) / max(count, 1)
+                for number in range(count):
+                    final = number + 1 == count
+                    begin, end = time + number * step, instant if final else time + (number + 1) * step
+                    stepper.advance(begin, end, opens=number == 0, closes=final)
+                    progress.advance()
+                time = instant
+                yield stepper.state(time)
+    finally:
+        progress.finish()
 
 
 def choose_time_step(grid: Grid, ground: GroundBoundary, diffusivity: Diffusivity, wind: Wind) -> float:
