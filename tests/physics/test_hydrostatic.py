@@ -51,7 +51,7 @@ def test_every_column_for_itself():
 
 
 def test_vapour_lightens_the_column():
-    """Mixed vapour raises the virtual temperature to T/(1 - x(1 - 18.015/28.9635)): isothermal closed form."""
+    """Mixed vapour raises the virtual temperature: T/(1 - x(1 - 18.015/28.9635)): isothermal."""
     air = Atmosphere(relative_humidity=1.0, humidity_temperature=303.15)
     fraction = air.vapour_fraction()
     assert fraction == pytest.approx(

@@ -114,6 +114,11 @@ def test_what_is_no_picture(tmp_path, write, pixels, words):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_bytes_must_be_a_picture_too(tmp_path):
+    with pytest.raises(InputError, match="not a picture"):
+        write_png(tmp_path / "a.png", np.zeros((4, 4, 2), np.uint8))
+
+
 def test_unknown_kind(tmp_path):
     with pytest.raises(InputError, match=r"'\.jpg'.*\.png or \.exr"):
         write_picture(tmp_path / "a.jpg", RAMP)

@@ -101,6 +101,7 @@ def write_png(
     pixels = np.asarray(radiance)
     if pixels.dtype != np.uint8:
         pixels = encoded(pixels, exposure=exposure, highlights=highlights)
+    _check_shape(pixels)
     info = PngImagePlugin.PngInfo()
     info.add(b"sRGB", b"\x00")
     for name, text in (provenance or Provenance()).fields().items():
@@ -207,10 +208,7 @@ def read_picture(path: str | Path) -> NDArray[Any]:
 
 def _checked(radiance: ArrayLike) -> NDArray[np.float32]:
     pixels = np.asarray(radiance, dtype=np.float32)
-    if pixels.ndim != 3 or pixels.shape[2] != 3 or 0 in pixels.shape:
-        raise InputError(
-            "not a picture", key="radiance", value=pixels.shape, expected="the shape (height, width, 3)"
-        )
+    _check_shape(pixels)
     finite = np.isfinite(pixels)
     if not finite.all():
         row, column, _ = (int(index) for index in np.argwhere(~finite)[0])
@@ -219,3 +217,10 @@ def _checked(radiance: ArrayLike) -> NDArray[np.float32]:
             key="radiance",
         )
     return pixels
+
+
+def _check_shape(pixels: NDArray[Any]) -> None:
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or 0 in pixels.shape:
+        raise InputError(
+            "not a picture", key="radiance", value=pixels.shape, expected="the shape (height, width, 3)"
+        )
