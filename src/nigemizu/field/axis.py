@@ -95,12 +95,16 @@ class BucketAxis(Axis):
         bits: Any = dr.reinterpret_array(types.UInt32, raised)
         bucket = dr.minimum((bits >> self._shift) - self._key, self.buckets - 1)
         index = dr.gather(types.UInt32, self._table, bucket, active)
-        for _ in range(self.corrections):
+        for _ in range(self.corrections - 1):
             above = dr.gather(types.Float, self._nodes, index + 1, active)
             index = dr.select((x >= above) & (index < self._cells - 1), index + 1, index)
+        # The last comparison also gives the fraction, from whichever side of the node x lies on.
+        node = dr.gather(types.Float, self._nodes, index + 1, active)
+        passed = (x >= node) & (index < self._cells - 1)
+        index = dr.select(passed, index + 1, index)
         inverse_width = dr.gather(types.Float, self._inverse_widths, index, active)
-        below = dr.gather(types.Float, self._nodes, index, active)
-        return index, dr.clip((x - below) * inverse_width, 0, 1), inverse_width
+        from_node = (x - node) * inverse_width
+        return index, dr.clip(dr.select(passed, from_node, 1 + from_node), 0, 1), inverse_width
 
 
 def make_axis(nodes: ArrayLike, types: Types, *, key: str) -> Axis:
@@ -156,4 +160,4 @@ def _bucket_table(
     cells = len(nodes) - 1
     start = np.clip(np.searchsorted(nodes, (edges - slack)[:-1], side="right") - 1, 0, cells - 1)
     end = np.clip(np.searchsorted(nodes, (edges + slack)[1:], side="right") - 1, 0, cells - 1)
-    return start.astype(np.uint32), int(np.max(end - start))
+    return start.astype(np.uint32), max(1, int(np.max(end - start)))

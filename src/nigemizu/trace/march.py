@@ -98,8 +98,27 @@ def march(
     with the next step taken to be like the last, stays under `chord_tolerance` times the distance
     travelled (at least 1 m).
 
-    The call may be nested in a symbolic loop. Limits: light is geometric; steps must be short against
-    the length over which the gradient changes.
+    The call may be nested in a symbolic loop. The step in which a ray leaves the volume is bent wholly
+    or not at all: a first-order error, but only of that one step.
+
+    Limits: light is geometric; steps must be short against the length over which the gradient changes.
+
+    References
+    ----------
+    A. Sharma, D. V. Kumar, A. K. Ghatak (1982), Tracing rays through graded-index media: a new method,
+    Applied Optics 21, 984–987, doi:10.1364/AO.21.000984, for the equations in σ.
+
+    Examples
+    --------
+    A ray that falls by 2 mrad from eye height towards a hot ground turns before it gets there:
+
+    >>> from nigemizu import field, trace
+    >>> types = field.types("llvm", "double")
+    >>> air = field.ExponentialSquare(types, a=1.00027**2, amplitude=5e-5, height=0.05)
+    >>> eye, ahead = types.Array3f(0, 0, 1.5), types.Array3f(1, 0, -0.002)
+    >>> end = trace.march(air, eye, ahead, step=0.1, max_steps=10_000, details=True)
+    >>> round(float(end.turning_height[0]), 3)
+    0.126
     """
     types = field.types
     Float, Array3f, UInt32, Bool = types.Float, types.Array3f, types.UInt32, types.Bool
