@@ -176,3 +176,25 @@ def test_all_objects_are_seen():
         middle = np.nonzero(covered)[1].mean() + 0.5
         assert abs(middle - 32) < 4, name
         assert covered[:, 0].sum() == 0, name
+
+
+@pytest.mark.parametrize("distance", [60.0, 1000.0, 20_000.0])
+def test_ground_is_met_where_it_is(distance):
+    """A ray that grazes the ground from 1.7 m meets it within 10⁻⁶ of the distance of the exact point.
+
+    (One rectangle of the same size is off by 0.2 m at any distance.)
+    """
+    scene = render.build(render.Camera(), render.Light(), [render.Ground()], integrator={"type": "path"})
+    rng = np.random.default_rng(2)
+    x = distance * (1 + 0.1 * rng.random(10_000))
+    towards = np.stack([x, 0.03 * x, np.full_like(x, -1.7)])
+    towards = (towards / np.linalg.norm(towards, axis=0)).astype(np.float32)
+    ray = mi.Ray3f(mi.Point3f(0, -1.9, 1.7), mi.Vector3f(towards))
+    met = scene.ray_intersect(ray)
+    exact = towards.astype(np.float64) * (np.float64(np.float32(1.7)) / -towards[2].astype(np.float64))
+    exact += np.array([[0.0], [-1.9], [np.float64(np.float32(1.7))]])
+    assert np.all(np.array(met.is_valid()))
+    error = np.abs(np.array(met.p, dtype=np.float64) - exact).max(axis=1)
+    assert error[0] < 1e-6 * distance
+    assert error[1] < 1e-6 * distance
+    assert np.all(np.array(met.p)[2] == 0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -32,8 +33,6 @@ from nigemizu.render.objects import (
 from nigemizu.render.sky import bake
 
 __all__ = ["build"]
-
-FAR: Final = 1.0e6  # m, half side of the ground: its edge is 2 µrad below the horizon of a standing eye
 
 # Gloss and colour of the car's parts that the paint does not colour.
 _PARTS: Final[dict[str, tuple[tuple[float, float, float], bool]]] = {
@@ -128,15 +127,11 @@ def _shapes(item: Object, key: str, camera: Camera) -> dict[str, Any]:
         case Ground():
             return {"ground": _ground(item, key, camera)}
         case Pyramid():
-            course = item.material.course if isinstance(item.material, Masonry) else None
-            seed = item.material.seed if isinstance(item.material, Masonry) else 0
-            triangles = meshes.pyramid(item, course, seed).moved(item.position, item.rotation)
+            triangles = _pyramid(item).moved(item.position, item.rotation)
             place = (item.position, item.rotation)
             return {"pyramid": _mesh(triangles, _bsdf(item.material, f"{key}.material", camera, place))}
         case Box():
-            triangles = meshes.box(item.size).moved(item.position, item.rotation)
-            place = (item.position, item.rotation)
-            return {"box": _mesh(triangles, _bsdf(item.material, f"{key}.material", camera, place))}
+            return {"box": _box(item, key, camera)}
         case Pole():
             return _pole(item)
         case Sphere():
@@ -158,13 +153,9 @@ def _shapes(item: Object, key: str, camera: Camera) -> dict[str, Any]:
             return _foreign(item, key)
 
 
-def _ground(item: Ground, key: str, camera: Camera) -> dict[str, Any]:
-    transform = mi.ScalarTransform4f
-    return {
-        "type": "rectangle",
-        "to_world": transform().translate([0, 0, item.height]) @ transform().scale([FAR, FAR, 1]),
-        "bsdf": _ground_bsdf(item.material, item.road, f"{key}.material", camera),
-    }
+def _ground(item: Ground, key: str, camera: Camera) -> Any:
+    bsdf = _ground_bsdf(item.material, item.road, f"{key}.material", camera)
+    return _mesh(meshes.plain(item.height), bsdf)
 
 
 def _ground_bsdf(material: Material, road: Road | None, key: str, camera: Camera) -> dict[str, Any]:
@@ -268,16 +259,40 @@ def _mesh(triangles: meshes.Triangles, bsdf: dict[str, Any], **extra: Any) -> An
         vertex_count=len(triangles.vertices),
         face_count=len(triangles.faces),
         has_vertex_normals=triangles.smooth,
-        has_vertex_texcoords=False,
+        has_vertex_texcoords=triangles.coordinates is not None,
         props=props,
     )
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = mi.Float(triangles.vertices.astype(np.float32).ravel())
     parameters["faces"] = mi.UInt32(triangles.faces.astype(np.uint32).ravel())
+    if triangles.coordinates is not None:
+        parameters["vertex_texcoords"] = mi.Float(triangles.coordinates.astype(np.float32).ravel())
     parameters.update()
     if triangles.smooth:
         mesh.recompute_vertex_normals()
     return mesh
+
+
+def _pyramid(item: Pyramid) -> meshes.Triangles:
+    match item.material:
+        case Masonry():
+            return meshes.pyramid(item, item.material.course, item.material.seed)
+        case Texture():
+            return meshes.pyramid_faces(item)
+    return meshes.pyramid(item, None, 0)
+
+
+def _box(item: Box, key: str, camera: Camera) -> dict[str, Any]:
+    # Mitsuba's own cube: it has texture coordinates on each face.
+    transform = mi.ScalarTransform4f
+    x, y, z = item.position
+    half = [length / 2 for length in item.size]
+    placed = transform().translate([x, y, z + half[2]]) @ transform().rotate([0, 0, 1], item.rotation)
+    return {
+        "type": "cube",
+        "to_world": placed @ transform().scale(half),
+        "bsdf": _bsdf(item.material, f"{key}.material", camera, (item.position, item.rotation)),
+    }
 
 
 def _pole(item: Pole) -> dict[str, Any]:
@@ -300,7 +315,7 @@ def _vehicle(item: Vehicle) -> dict[str, Any]:
         if name == "lamp" and item.headlights:
             extra["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": _HEADLIGHT}}
         for index, part in enumerate(parts):
-            sized = meshes.Triangles(part.vertices * scale, part.faces, part.smooth)
+            sized = replace(part, vertices=part.vertices * scale)
             shapes[f"{name}{index}"] = _mesh(sized.moved(item.position, item.heading), bsdf, **extra)
     return shapes
 

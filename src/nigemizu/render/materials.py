@@ -34,7 +34,7 @@ class Texture(Value):
     image : path
         Path of a PNG, JPEG or EXR file.
     repeat : (u, v)
-        How often the image is repeated across the surface.
+        How often the image is repeated across the surface; on the ground, per metre.
     """
 
     kind: Literal["texture"] = "texture"
@@ -60,7 +60,7 @@ class Sand(Value):
 
     kind: Literal["sand"] = "sand"
     colour: Reflectance = (0.52, 0.40, 0.27)
-    contrast: Fraction = 0.25
+    contrast: Fraction = 0.15
     scale: Length = 120.0
     seed: Annotated[int, Field(ge=0)] = 0
 
@@ -110,8 +110,8 @@ class Masonry(Value):
 
     kind: Literal["masonry"] = "masonry"
     colour: Reflectance = (0.50, 0.38, 0.25)
-    course: Length = 1.0
-    contrast: Fraction = 0.35
+    course: Length = 0.6
+    contrast: Fraction = 0.3
     seed: Annotated[int, Field(ge=0)] = 0
 
 

@@ -102,8 +102,8 @@ class Pyramid(Value):
 
     kind: Literal["pyramid"] = "pyramid"
     position: Position = (700.0, 0.0, 0.0)
-    base: Length = 60.0
-    height: Length = 38.0
+    base: Length = 36.0
+    height: Length = 23.0
     rotation: Degrees = 0.0
     material: Material = Masonry()
 

@@ -82,14 +82,16 @@ def picture(
     width, height = (int(length) for length in sensor.film().crop_size())
     total = np.zeros((height, width, 3), dtype=np.float64)
     progress.start("rendering", samples)
-    for index, count in enumerate(_passes(samples, width * height)):
-        state = np.random.SeedSequence([seed, frame, index]).generate_state(1)[0]
-        # Opaque: a number known to the compiler would be compiled in, again for every pass.
-        opaque = dr.opaque(mi.UInt32, int(state))
-        image = integrator.render(scene, sensor, seed=opaque, spp=count)
-        total += np.asarray(image, dtype=np.float64)[..., :3] * count
-        progress.advance(count)
-    progress.finish()
+    try:
+        for index, count in enumerate(_passes(samples, width * height)):
+            state = np.random.SeedSequence([seed, frame, index]).generate_state(1)[0]
+            # Opaque: a number known to the compiler would be compiled in, again for every pass.
+            opaque = dr.opaque(mi.UInt32, int(state))
+            image = integrator.render(scene, sensor, seed=opaque, spp=count)
+            total += np.asarray(image, dtype=np.float64)[..., :3] * count
+            progress.advance(count)
+    finally:
+        progress.finish()
     counts = np.asarray(integrator.counts) if counted else ()
     radiance = np.asarray(total * (2.0**exposure / samples), dtype=np.float32)
     return Picture(

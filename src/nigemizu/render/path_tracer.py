@@ -237,9 +237,9 @@ def _balance(pdf_a: Any, pdf_b: Any) -> Any:
 
 def _settings_of(props: Any) -> tuple[Settings, Frame | None]:
     """Split Mitsuba's properties into settings and the air's place."""
-    given = {key: props[key] for key in props.keys() if key != "id"}
+    given = {key: value for key, value in props.items() if key != "id"}
+    for key in given:
+        props.mark_queried(key)
     to_world = given.pop("to_world", None)
     frame = None if to_world is None else Frame.from_matrix(np.array(to_world.matrix, dtype=np.float64))
-    for key in props.keys():
-        props.mark_queried(key)
     return read_settings(given), frame

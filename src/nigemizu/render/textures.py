@@ -117,7 +117,8 @@ def texture_classes(variant: str) -> dict[str, Any]:
                 return sand
             y = si.p.y - self.centre
             half = self.road / 2
-            wander = 0.06 * self.noise(si.p.x, 0.3 * si.p.x, 2.5, 0.7)
+            # The edge of the asphalt crumbles, as far as a pixel shows it.
+            wander = 0.06 * dr.exp(-((wide_x / 2.0) ** 2)) * self.noise(si.p.x, y, 2.5, 0.7)
             on_road = _strip(dr.abs(y) + wander, -half, half, wide_y)
             return dr.lerp(sand, self.road_surface(si, y, across, wide_x, wide_y), on_road)
 
@@ -173,10 +174,11 @@ def texture_classes(variant: str) -> dict[str, Any]:
             stone = dr.floor(shifted)
             own = self.lottery(row, stone)
             whole_row = self.lottery(row, mi.Float(-7))
-            stain = self.noise(along, 0.35 * p.z, 9 * self.course, 0.9)
+            stain = self.noise(along, 1.4 * p.z, 9 * self.course, 0.9)
+            stain += self.noise(along, 1.4 * p.z, 2.7 * self.course, 2.1)
             joint = _strip(p.z - row * self.course, 0, 0.1 * self.course, across)
             side = _strip((shifted - stone) * length, 0, 0.08 * self.course, across)
-            shade = 1 + self.contrast * (0.25 * own + 0.2 * whole_row + 0.2 * stain)
+            shade = 1 + self.contrast * (0.3 * own + 0.15 * whole_row + 0.22 * stain)
             return self.colour * shade * (1 - 0.35 * dr.maximum(joint, side))
 
         def lottery(self, a: Any, b: Any) -> Any:
