@@ -39,7 +39,7 @@ class Tracer(Value):
         description="air beyond the sides of the volume; straight: no bending there, "
         "extend: the outermost columns continue",
     )
-    layers: int = Described(40, ge=1, le=100_000, description="layered: number of panes")
+    layers: int = Described(40, ge=2, le=100_000, description="layered: number of panes")
     layer_spacing: Literal["equal-index", "equal-height"] = Described(
         "equal-index",
         description="layered: panes with equal jumps of the index between them, or of equal thickness",
