@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Studio", "render", "warn_of_lost_rays"]
 
 # Fewer lost rays than this cannot be seen in a picture.
-_SEEN_SHARE: Final = 1e-4
+_SEEN_SHARE: Final = 1e-3
 
 
 @final
