@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from nigemizu.errors import InputError
-from nigemizu.heat.boundary import ExchangeGround, FluxGround, GroundBoundary, HeldGround, Sides, Top
+from nigemizu.heat.boundary import GroundBoundary, Sides, Top
 from nigemizu.heat.grid import Grid, available_memory, require_memory
-from nigemizu.heat.horizontal import HorizontalMotion
-from nigemizu.heat.kernels import move_levels, spread_columns
-from nigemizu.heat.quantity import Quantity
+from nigemizu.heat.stepping import GroundCourse, State, Stepper, ground_quantity
 from nigemizu.heat.transport import Diffusivity, Wind
-from nigemizu.heat.vertical import BOUNDARY_ROWS, VerticalDiffusion
+from nigemizu.heat.vertical import VerticalDiffusion
 from nigemizu.progress import SILENT, ProgressMeter
 
 if TYPE_CHECKING:
@@ -32,25 +27,6 @@ COURANT: Final = 2.0
 
 SPREADING: Final = 4.0
 """Horizontal diffusivity × step / cell² of an automatic step, where the diffusivity varies with height."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class State:
-    """The air at one instant.
-
-    Attributes
-    ----------
-    time : float, s
-    temperature : (nz, ny, nx) float64, K
-        At the cell centres.
-    surface_temperature : (ny, nx) float64, K
-        Of the air's skin on the ground, at the lower face of the lowest cells.
-    """
-
-    time: float
-    temperature: np.ndarray
-    surface_temperature: np.ndarray
 
 
 def evolve(
@@ -138,12 +114,12 @@ def evolve(
     initial = _check_temperature(grid, temperature)
     longest = time_step or choose_time_step(grid, ground, diffusivity, wind)
     column = VerticalDiffusion.build(grid, diffusivity, ground, top)
-    stepper = _Stepper(grid, initial, column, _Ground(grid, ground), top, diffusivity, wind, sides)
+    stepper = Stepper(grid, initial, column, GroundCourse(grid, ground), top, diffusivity, wind, sides)
     return _march(stepper, instants, start, longest, progress)
 
 
 def _march(
-    stepper: _Stepper, instants: list[float], start: float, longest: float, progress: ProgressMeter
+    stepper: Stepper, instants: list[float], start: float, longest: float, progress: ProgressMeter
 ) -> Iterator[State]:
     intervals = np.diff([start, *instants])
     counts = [_steps(float(interval), longest) for interval in intervals]
@@ -170,7 +146,7 @@ def choose_time_step(grid: Grid, ground: GroundBoundary, diffusivity: Diffusivit
     Infinite when nothing but the wanted times limits it.
     """
     heights = grid.z - grid.z_edges[0]
-    limit = _numbers(ground).finest()
+    limit = ground_quantity(ground).finest()
     speeds, spreads = wind.velocity(heights), diffusivity.sideways(heights)
     for axis, count, speed, spread in zip("xy", grid.shape[:0:-1], speeds, spreads, strict=True):
         if count == 1:
@@ -226,157 +202,9 @@ def solve(
     return to_dataset(grid, states)
 
 
-class _Ground:
-    """The ground's number over the cells, split into what varies in time and what varies in place."""
-
-    def __init__(self, grid: Grid, ground: GroundBoundary) -> None:
-        self.quantity = _numbers(ground)
-        self.factor, self.summand = self.quantity.planes(grid)
-
-    def fill(self, plane: np.ndarray, time: float) -> None:
-        """Write the numbers at `time` into a plane of ny × nx cells in a row."""
-        np.multiply(self.factor.ravel(), self.quantity.at_time(time), out=plane)
-        plane += self.summand.ravel()
-
-
-def _numbers(ground: GroundBoundary) -> Quantity:
-    match ground:
-        case HeldGround() | ExchangeGround():
-            return ground.temperature
-        case FluxGround():
-            return ground.heat_flux
-
-
-class _Stepper:
-    """The two volumes, and the coefficients of every step length that was needed so far."""
-
-    def __init__(
-        self,
-        grid: Grid,
-        initial: np.ndarray,
-        column: VerticalDiffusion,
-        ground: _Ground,
-        top: Top,
-        diffusivity: Diffusivity,
-        wind: Wind,
-        sides: Sides,
-    ) -> None:
-        self.grid, self.column, self.ground = grid, column, ground
-        self.diffusivity, self.wind, self.sides = diffusivity, wind, sides
-        self.levels = grid.shape[0]
-        # the levels as rows, followed by the ground's number before and after the step and by the top's
-        self.now = np.empty((self.levels + BOUNDARY_ROWS, math.prod(grid.shape[1:])))
-        self.next = np.empty_like(self.now)
-        self.now[: self.levels] = initial.reshape(self.levels, -1)
-        held = _top_temperature(grid, initial) if top.temperature is None else top.temperature
-        self.now[-1] = self.next[-1] = held
-        self.columns: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
-        self.motions: dict[float, HorizontalMotion] = {}
-        self.y_first = False
-        self.workers = _processors()
-        self.pool: ThreadPoolExecutor | None = None
-
-    def __enter__(self) -> None:
-        self.pool = ThreadPoolExecutor(self.workers)
-
-    def __exit__(self, *_: object) -> None:
-        assert self.pool is not None
-        self.pool.shutdown()
-
-    def advance(self, time: float, end: float, *, opens: bool, closes: bool) -> None:
-        """One step from `time` to `end` [s].
-
-        The half steps of horizontal motion that meet between two steps of a run are made as one; the first
-        step of a run opens with a half, the last one closes with a half.
-        """
-        step = _rounded(end - time)
-        if opens:
-            self._move(0.5 * step)
-        if step not in self.columns:
-            matrix = self.column.step(step)
-            self.columns[step] = (matrix, *self.column.reach(matrix))
-        self.ground.fill(self.now[self.levels], time)
-        self.ground.fill(self.now[self.levels + 1], end)
-        corners = np.linspace(0, self.now.shape[1], self.workers + 1).astype(np.int64)
-        self._share(
-            spread_columns,
-            [
-                (*self.columns[step], self.now, self.next, first, last)
-                for first, last in itertools.pairwise(corners)
-            ],
-        )
-        self.now, self.next = self.next, self.now
-        self._move(0.5 * step if closes else step)
-
-    def _move(self, step: float) -> None:
-        if step not in self.motions:
-            self.motions[step] = HorizontalMotion.build(
-                self.grid, self.diffusivity, self.wind, self.sides, step
-            )
-        motion = self.motions[step]
-        if motion.is_still:
-            return
-        air = self.now[: self.levels].reshape(self.grid.shape)
-        coefficients = (
-            motion.shifts,
-            motion.parts,
-            motion.carry,
-            motion.halves,
-            motion.kernels,
-            motion.periodic,
-        )
-        self._share(
-            move_levels,
-            [(air, worker, self.workers, self.y_first, *coefficients) for worker in range(self.workers)],
-        )
-        # the limiter makes the order of the axes matter a little: take turns
-        self.y_first = not self.y_first
-
-    def _share(self, work: Callable[..., None], portions: Sequence[tuple[object, ...]]) -> None:
-        """Do the portions of a compiled loop side by side; they touch different parts of the air."""
-        assert self.pool is not None
-        for task in [self.pool.submit(work, *portion) for portion in portions]:
-            task.result()
-
-    def state(self, time: float) -> State:
-        """A copy of the air at `time` [s]."""
-        temperature = self.now[: self.levels].reshape(self.grid.shape).copy()
-        lowest = float(np.min(temperature))
-        if not lowest > 0:
-            raise InputError(
-                f"the air cools below 0 K before {time:g} s",
-                key="ground.heat_flux",
-                remedy="a lasting negative flux takes more heat than the air can give",
-            )
-        skin = np.empty(temperature[0].size)
-        self.ground.fill(skin, time)
-        skin *= self.column.skin_ground
-        skin += self.column.skin_air * temperature[0].ravel()
-        return State(time, temperature, skin.reshape(self.grid.shape[1:]))
-
-
-def _processors() -> int:
-    # what this process may use, where the system tells
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _steps(interval: float, longest: float) -> int:
     """Number of equal steps in an interval; none in an empty one."""
     return 0 if interval == 0 else max(1, math.ceil(interval / longest * (1 - 1e-12)))
-
-
-def _rounded(step: float) -> float:
-    """The step without its last digits, so that equal steps share their coefficients."""
-    return float(f"{step:.14g}")
-
-
-def _top_temperature(grid: Grid, initial: np.ndarray) -> float:
-    """Mean temperature at the top of the box, on the line through the two highest levels."""
-    highest = float(np.mean(initial[-1]))
-    if grid.shape[0] == 1:
-        return highest
-    slope = (highest - float(np.mean(initial[-2]))) / (grid.z[-1] - grid.z[-2])
-    return float(highest + slope * (grid.z_edges[-1] - grid.z[-1]))
 
 
 def _check_times(times: Sequence[float], start: float) -> list[float]:
