@@ -13,7 +13,7 @@ cancellation, as a sum of non-negative terms (uniformization) that is squared re
 
 References
 ----------
-C. Bolley, M. Crouzeix, RAIRO Analyse numérique 12, 237-245 (1978), doi:10.1051/m2an/1978120302371.
+C. Bolley, M. Crouzeix, RAIRO Analyse numérique 12, 237-245 (1978).
 """
 
 from __future__ import annotations
