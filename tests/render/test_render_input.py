@@ -10,7 +10,7 @@ import xarray as xr
 from pydantic import ValidationError
 from render_scenes import sensor
 
-from nigemizu import render
+from nigemizu import field, render, trace
 from nigemizu.errors import InputError, MachineError
 
 Y_UP = """<scene version="3.0.0">
@@ -201,3 +201,29 @@ def test_values_refuse_nonsense():
     ):
         with pytest.raises(ValidationError):
             make()
+
+
+def test_layered_method_from_a_dataset(air_file):
+    """The panes are cut from the dataset's profile; many panes come close to the volume, few do not."""
+    pictures = {}
+    for method, layers in (("bent", 2), ("layered", 300), ("layered", 4)):
+        scene = z_up(air_file)
+        scene["integrator"] |= {"method": method, "layers": layers}
+        pictures[method, layers] = np.asarray(mi.render(mi.load_dict(scene), spp=64, seed=1))
+    many = np.abs(pictures["layered", 300] - pictures["bent", 2]).mean()
+    few = np.abs(pictures["layered", 4] - pictures["bent", 2]).mean()
+    assert many < 0.01
+    assert few > 3 * many
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_surfaces_of_a_scene_serve_the_tracer(variant, precision):
+    """The callback takes and gives the caller's array types, double precision without derivatives too."""
+    kind = field.types(variant.split("_")[0], precision, differentiable=precision == "single")
+    wall = {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, -500]).scale(1e3)}
+    surface = render.surface_query(mi.load_dict({"type": "scene", "wall": wall}))
+    origin, down = kind.Array3f([0, 0], [0, 0], [0, 0]), kind.Array3f([0, 0], [0, 0], [-1, 1])
+    end = trace.march(field.Uniform(kind), origin, down, step=10.0, max_steps=100, surface=surface)
+    assert np.array(end.hit).tolist() == [True, False]
+    assert isinstance(end.path_length, kind.Float)
+    assert np.array(end.path_length)[0] == pytest.approx(500.0, rel=1e-6)
