@@ -88,6 +88,8 @@ def picture(
             # Opaque: a number known to the compiler would be compiled in, again for every pass.
             opaque = dr.opaque(mi.UInt32, int(state))
             image = integrator.render(scene, sensor, seed=opaque, spp=count)
+            if integrator.should_stop():  # Mitsuba keeps Ctrl-C to itself while it renders
+                raise KeyboardInterrupt
             total += np.asarray(image, dtype=np.float64)[..., :3] * count
             progress.advance(count)
     finally:

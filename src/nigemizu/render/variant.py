@@ -67,6 +67,8 @@ def select_variant(backend: Literal["auto", "llvm", "cuda"] = "auto") -> str:
         # Dr.Jit aborts the process inside an old LLVM, which Python cannot catch: look before compiling.
         field.types("cuda" if wanted == _VARIANTS["cuda"] else "llvm")
         mi.set_variant(wanted)
+        # What a person must know comes as an error or warning of ours; Mitsuba would write to stdout.
+        mi.set_log_level(mi.LogLevel.Error)
     _register_textures(wanted)
     return wanted
 

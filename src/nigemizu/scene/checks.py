@@ -30,7 +30,7 @@ def check(scene: Scene, available: Callable[[], int | None]) -> None:
 def _check_files(scene: Scene) -> None:
     for key, path in _paths(scene, ""):
         if not path.expanduser().exists():
-            raise InputError("no such file", key=key, value=str(path))
+            raise InputError(f"no such file: {path}", key=key)  # in full, however long
 
 
 def _paths(value: Value, prefix: str) -> Iterator[tuple[str, Path]]:

@@ -206,7 +206,10 @@ class Scene(Value):
         overrides: Mapping[str, Any] | None = None,
     ) -> Self:
         """Read a scene from TOML text; relative paths in it count from `folder` (the working directory)."""
-        data = apply_overrides(parse_toml(text, file), overrides or {})
+        try:
+            data = apply_overrides(parse_toml(text, file), overrides or {})
+        except InputError as error:
+            raise error.in_file(file) from error
         return validate(cls, data, file=file, folder=folder or Path.cwd())
 
     def with_changes(self, overrides: Mapping[str, Any]) -> Self:
