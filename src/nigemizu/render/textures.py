@@ -158,6 +158,7 @@ def texture_classes(variant: str) -> dict[str, Any]:
         def __init__(self, props: Any) -> None:
             super().__init__(props)
             self.course = float(props["course"])
+            self.salt = 100_000 * (1 + props.get("seed", 0) % 40_000)
             self.centre = mi.ScalarPoint3f(props.get("centre", mi.ScalarPoint3f(0)))
             self.turn = float(props.get("turn", 0.0))
 
@@ -182,9 +183,11 @@ def texture_classes(variant: str) -> dict[str, Any]:
             return self.colour * shade * (1 - 0.35 * dr.maximum(joint, side))
 
         def lottery(self, a: Any, b: Any) -> Any:
-            """A number of mean 0 and rms about 1 that depends on two whole numbers."""
-            u = mi.Point2f(a * 0.7548777 + b * 0.2451223, a * 0.5698403 + b * 0.4301597)
-            return self.tile.eval(u - dr.floor(u))[0]
+            """A random number of mean 0 and rms 1 that depends on two whole numbers and the seed."""
+            row: Any = mi.UInt32(mi.Int32(a)) + self.salt
+            stone: Any = mi.UInt32(mi.Int32(b))
+            drawn = mi.sample_tea_float32(row, stone)
+            return (drawn - 0.5) * float(np.sqrt(12.0))
 
     return {"nigemizu_ground": Ground, "nigemizu_checker": Checker, "nigemizu_masonry": Masonry}
 
