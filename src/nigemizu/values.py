@@ -57,7 +57,7 @@ class Value(BaseModel):
 
 
 def field_unit(field: FieldInfo) -> str | None:
-    """The unit that a field declares, or None; ``Annotated[float, Field(…)] | None`` declares that of its number."""
+    """The unit that a field declares, or None; it may stand inside, as in ``Annotated[float, …] | None``."""
     extra = field.json_schema_extra
     if isinstance(extra, dict) and isinstance(extra.get("unit"), str):
         return str(extra["unit"])

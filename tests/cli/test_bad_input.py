@@ -148,9 +148,7 @@ def test_unwritable_folder(run: Run) -> None:
     assert_refused(run("simulate", "pyramid", "-o", "/proc/air.zarr"), "/proc")
 
 
-def test_full_disk(
-    run: Run, small: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_full_disk(run: Run, small: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     import errno
 
     def no_room(source: object, target: object) -> None:

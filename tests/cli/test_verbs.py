@@ -28,7 +28,19 @@ def test_render_writes_the_picture_and_says_where(run: Run, small: tuple[str, ..
 
 
 def test_flags_and_set_say_the_same(run: Run, small: tuple[str, ...]) -> None:
-    run("render", "pyramid", "-o", "flags.png", *small, "--size", "20x10", "--spp", "3", "--method", "straight")
+    run(
+        "render",
+        "pyramid",
+        "-o",
+        "flags.png",
+        *small,
+        "--size",
+        "20x10",
+        "--spp",
+        "3",
+        "--method",
+        "straight",
+    )
     keys = ("camera.width=20", "camera.height=10", "camera.samples=3", "tracer.method='straight'")
     run("render", "pyramid", "-o", "set.png", *small, *(f"--set={key}" for key in keys))
     with Image.open("flags.png") as one, Image.open("set.png") as other:
@@ -106,7 +118,16 @@ def test_trace_prints_rays_as_json(run: Run, small: tuple[str, ...]) -> None:
     rays = json.loads(done.out)
     asked = [(elevation, azimuth) for azimuth in (-1, 1) for elevation in (-2, 0, 2)]
     assert [(ray["elevation"], ray["azimuth"]) for ray in rays] == asked
-    keys = {"elevation", "azimuth", "status", "end", "end_direction", "turning_height", "optical_path", "steps"}
+    keys = {
+        "elevation",
+        "azimuth",
+        "status",
+        "end",
+        "end_direction",
+        "turning_height",
+        "optical_path",
+        "steps",
+    }
     assert all(set(ray) == keys for ray in rays)
     down = rays[0]
     assert down["status"] == "hit"

@@ -1,7 +1,7 @@
 """The command ``nigemizu``: verbs over `nigemizu.scene`.
 
-Exit codes: 0 done; 2 bad input or a machine that lacks something, said in one line on stderr; 130 interrupted;
-141 the reader of the output went away. Results go to stdout, everything else to stderr.
+Exit codes: 0 done; 2 bad input or a machine that lacks something, said in one line on stderr; 130
+interrupted; 141 the reader of the output went away. Results go to stdout, everything else to stderr.
 """
 
 from __future__ import annotations

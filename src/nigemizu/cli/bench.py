@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -63,11 +64,15 @@ def march_rate(nodes: tuple[int, int, int] = (256, 256, 128), rays: int = 2**19,
     from nigemizu import field, trace
 
     types = field.types("llvm")
-    x, y, z = (np.linspace(0.0, extent, count) for extent, count in zip((512.0, 512.0, 16.0), nodes, strict=True))
+    x, y, z = (
+        np.linspace(0.0, extent, count) for extent, count in zip((512.0, 512.0, 16.0), nodes, strict=True)
+    )
     uneven = np.random.default_rng(0).normal(0.0, 1e-7, nodes[::-1])
     volume = field.TrilinearVolume(x, y, z, 2.7e-4 - 2e-5 * np.exp(-z / 0.5)[:, None, None] + uneven, types)
     random = np.random.default_rng(1)
-    origin = types.Array3f(*(types.Float(random.uniform(*span, rays)) for span in ((1, 2), (1, 511), (4, 12))))
+    origin = types.Array3f(
+        *(types.Float(random.uniform(*span, rays)) for span in ((1, 2), (1, 511), (4, 12)))
+    )
     direction = types.Array3f(types.Float(1.0), types.Float(0.0), types.Float(0.0))
     dr.eval(origin, direction)
     made = 0
@@ -83,7 +88,6 @@ def march_rate(nodes: tuple[int, int, int] = (256, 256, 128), rays: int = 2**19,
 
 def picture_times(size: tuple[int, int] = (480, 270), samples: int = 16) -> dict[str, float]:
     """Time [s] of the built-in pyramid, bent and straight, compiled already."""
-    from nigemizu.progress import SILENT
     from nigemizu.scene import Scene
     from nigemizu.scene.rendering import Studio
 
@@ -94,7 +98,7 @@ def picture_times(size: tuple[int, int] = (480, 270), samples: int = 16) -> dict
     for method in ("bent", "straight"):
         studio = Studio(scene.with_changes({"tracer.method": method}), "auto")
         volume = air if method == "bent" else None
-        taken[method] = best_of(2, lambda seen=studio, through=volume: seen.shoot(through, progress=SILENT))
+        taken[method] = best_of(2, partial(studio.shoot, volume))
     return taken
 
 

@@ -20,7 +20,19 @@ from nigemizu.errors import MachineError
 __all__ = ["demand_backend", "examine", "find_backends", "report"]
 
 OLDEST_LLVM: Final = 16
-_PACKAGES: Final = ("mitsuba", "drjit", "numpy", "scipy", "numba", "xarray", "zarr", "netCDF4", "pydantic", "av", "matplotlib")
+_PACKAGES: Final = (
+    "mitsuba",
+    "drjit",
+    "numpy",
+    "scipy",
+    "numba",
+    "xarray",
+    "zarr",
+    "netCDF4",
+    "pydantic",
+    "av",
+    "matplotlib",
+)
 
 
 def examine() -> dict[str, Any]:

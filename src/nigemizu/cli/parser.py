@@ -77,7 +77,9 @@ def angles(text: str) -> tuple[float, ...]:
             raise argparse.ArgumentTypeError(f"{part!r} is no range; write first:last:step")
         count = int((last - first) / step + 1e-9) + 1
         if count > 100_000:
-            raise argparse.ArgumentTypeError(f"{part!r} makes {count} angles; at most 100000 are traced at once")
+            raise argparse.ArgumentTypeError(
+                f"{part!r} makes {count} angles; at most 100000 are traced at once"
+            )
         # Steps are counted, not added up, so that the range ends where it says.
         values.extend(round(first + index * step, 12) for index in range(count))
     return tuple(values)
@@ -231,7 +233,9 @@ def _render(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="OUT", help="picture to write, .png or .exr (SCENE.png)")
     parser.add_argument("--time", type=_time, metavar="SECONDS", help="instant to show")
     parser.add_argument(
-        "--compare", action="store_true", help="straight, layered and bent in one labelled picture, and each alone"
+        "--compare",
+        action="store_true",
+        help="straight, layered and bent in one labelled picture, and each alone",
     )
 
 
@@ -260,7 +264,11 @@ def _trace(parser: argparse.ArgumentParser) -> None:
         "-e", "--elevation", type=angles, metavar="DEG", help="above the horizontal: list or first:last:step"
     )
     parser.add_argument(
-        "-a", "--azimuth", type=angles, metavar="DEG", help="from the camera's heading, to the left: list or range"
+        "-a",
+        "--azimuth",
+        type=angles,
+        metavar="DEG",
+        help="from the camera's heading, to the left: list or range",
     )
     parser.add_argument("--time", type=_time, metavar="SECONDS", help="instant of the air")
     _json(parser)

@@ -92,7 +92,9 @@ def trace(options: argparse.Namespace) -> int:
     if options.output is not None:
         ready_to_write(options.output, (".csv", ".nc", ".png", ".svg"))
     elif not options.json:
-        raise InputError("nothing to write", key="trace", remedy="add --json, or -o rays.svg (.png, .csv, .nc)")
+        raise InputError(
+            "nothing to write", key="trace", remedy="add --json, or -o rays.svg (.png, .csv, .nc)"
+        )
     demand_backend(options.variant)
     _use_threads(options.threads)
     with _naming(options.scene), meter(quiet=options.quiet) as progress:
@@ -140,7 +142,9 @@ def check(options: argparse.Namespace) -> int:
         with _naming(name):
             scene.check()
         nz, ny, nx = scene.grid.cells[::-1]
-        print(f"{name}: valid ({scene.title or 'untitled'}; {nx}×{ny}×{nz} cells, {len(scene.objects)} objects)")
+        print(
+            f"{name}: valid ({scene.title or 'untitled'}; {nx}×{ny}×{nz} cells, {len(scene.objects)} objects)"
+        )
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from nigemizu.scene.model import FilmSpec, Scene, TimeSpec, builtin_scenes, load
+from nigemizu.scene.model import Scene, builtin_scenes, load
+from nigemizu.scene.times import FilmSpec, TimeSpec
 
 __all__ = ["FilmSpec", "Scene", "TimeSpec", "builtin_scenes", "load"]

@@ -50,7 +50,10 @@ def _check_camera(scene: Scene) -> None:
     ground = max((entry.height for entry in scene.objects if entry.kind == "ground"), default=0.0)
     if z <= ground:
         raise InputError(
-            "the eye is below the ground", key="camera.eye", value=list(scene.camera.eye), expected=f"z > {ground:g} m"
+            "the eye is below the ground",
+            key="camera.eye",
+            value=list(scene.camera.eye),
+            expected=f"z > {ground:g} m",
         )
     if z > _HIGHEST_EYE or max(abs(x), abs(y)) > _FARTHEST_EYE:
         raise InputError(

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from nigemizu.progress import ProgressMeter
-from nigemizu.scene.running import AirSource, air_at
+from nigemizu.scene.running import AirSource, Variant, air_at
 
 if TYPE_CHECKING:
     from nigemizu.scene.model import Scene
@@ -25,7 +25,7 @@ def compare(
     path: Path,
     time: float | None,
     air: AirSource,
-    variant: str,
+    variant: Variant,
     command: str,
     progress: ProgressMeter,
 ) -> list[Path]:
@@ -37,7 +37,8 @@ def compare(
     scene.check()
     volume = air_at(scene, time, air, progress)
     pictures = {
-        method: scene.render(air=volume, method=method, variant=variant, progress=progress) for method in METHODS
+        method: scene.render(air=volume, method=method, variant=variant, progress=progress)
+        for method in METHODS
     }
     panels = [(METHODS[method], picture.pixels) for method, picture in pictures.items()]
     written = [write_panels(path, panels, provenance=Provenance(scene=scene.to_toml(), command=command))]

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from nigemizu.errors import MachineError
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.scene.rendering import Studio, warn_of_lost_rays
-from nigemizu.scene.running import AirSource, AirVolume, air_instants, open_air, require_within
+from nigemizu.scene.running import AirSource, AirVolume, Variant, air_instants, open_air, require_within
 
 if TYPE_CHECKING:
     from nigemizu.output import FrameFolder
@@ -30,7 +30,13 @@ _Job: TypeAlias = tuple[int, AirVolume | None, Path]
 
 
 def animate(
-    scene: Scene, path: Path, air: AirSource, workers: int, variant: str, command: str, progress: ProgressMeter
+    scene: Scene,
+    path: Path,
+    air: AirSource,
+    workers: int,
+    variant: Variant,
+    command: str,
+    progress: ProgressMeter,
 ) -> Path:
     """See `nigemizu.scene.Scene.animate`."""
     from nigemizu.output import FrameFolder, Provenance, ready_to_write, write_film
@@ -96,7 +102,7 @@ def _jobs(scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSou
 
 
 def _render_here(
-    scene: Scene, jobs: Iterator[_Job], variant: str, progress: ProgressMeter
+    scene: Scene, jobs: Iterator[_Job], variant: Variant, progress: ProgressMeter
 ) -> Counter[str]:
     studio: Studio | None = None
     statuses: Counter[str] = Counter()
@@ -110,7 +116,7 @@ def _render_here(
 
 
 def _render_in_processes(
-    scene: Scene, jobs: Iterator[_Job], variant: str, workers: int, progress: ProgressMeter
+    scene: Scene, jobs: Iterator[_Job], variant: Variant, workers: int, progress: ProgressMeter
 ) -> Counter[str]:
     """Few instants are under way at once, so that the air of a long film is never held as a whole."""
     threads = max(1, (os.cpu_count() or 1) // workers)
@@ -166,7 +172,7 @@ def _prepare_process() -> None:
     warnings.simplefilter("ignore")
 
 
-def _render_one(toml: str, variant: str, threads: int, job: _Job) -> dict[str, int]:
+def _render_one(toml: str, variant: Variant, threads: int, job: _Job) -> dict[str, int]:
     index, air, frame = job
     picture = _studio(toml, variant, threads).shoot(air, frame=index)
     picture.save(frame)
@@ -174,7 +180,7 @@ def _render_one(toml: str, variant: str, threads: int, job: _Job) -> dict[str, i
 
 
 @functools.cache
-def _studio(toml: str, variant: str, threads: int) -> Studio:
+def _studio(toml: str, variant: Variant, threads: int) -> Studio:
     import drjit
 
     from nigemizu.scene.model import Scene

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self, final
+from typing import TYPE_CHECKING, Any, Self, final
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from nigemizu.air import Atmosphere
 from nigemizu.errors import InputError
@@ -21,6 +21,7 @@ from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.render import Camera, Light, Object
 from nigemizu.scene.memory import memory_available
 from nigemizu.scene.reading import apply_overrides, parse_toml, read_text, validate
+from nigemizu.scene.times import FilmSpec, TimeSpec
 from nigemizu.scene.writing import to_toml
 from nigemizu.trace import Tracer
 from nigemizu.values import Value, nearest
@@ -31,81 +32,16 @@ if TYPE_CHECKING:
     from nigemizu.scene import running
     from nigemizu.scene.picture import RenderedPicture
     from nigemizu.scene.rays import TracedRays
-    from nigemizu.scene.running import AirSource
+    from nigemizu.scene.running import AirSource, Variant
 
-__all__ = ["FilmSpec", "Scene", "TimeSpec", "builtin_scenes", "load"]
-
-
-@final
-class TimeSpec(Value):
-    """The time that is simulated, from 0.
-
-    Parameters
-    ----------
-    duration : float, s
-        End of the simulated time.
-    picture : float, s, optional
-        Instant that a single picture shows; the end unless given.
-    store_every : float, s, optional
-        Time between the instants that a dataset stores; a tenth of the duration unless given.
-    step : float, s, optional
-        Time step of the heat stage; chosen for accuracy unless given.
-    """
-
-    duration: Annotated[float, Field(ge=0, json_schema_extra={"unit": "s"})] = 600.0
-    picture: Annotated[float, Field(ge=0)] | None = Field(None, json_schema_extra={"unit": "s"})
-    store_every: Annotated[float, Field(gt=0)] | None = Field(None, json_schema_extra={"unit": "s"})
-    step: Annotated[float, Field(gt=0)] | None = Field(None, json_schema_extra={"unit": "s"})
-
-    @property
-    def shown(self) -> float:
-        """Instant of a single picture [s]."""
-        return self.duration if self.picture is None else self.picture
-
-    @property
-    def stored(self) -> tuple[float, ...]:
-        """Instants of a dataset [s], from 0 to the end."""
-        every = self.store_every or self.duration / 10.0
-        if every <= 0.0:
-            return (0.0,)
-        inner = [index * every for index in range(int(self.duration / every * (1 + 1e-12)) + 1)]
-        if self.duration - inner[-1] > 1e-9 * self.duration:
-            inner.append(self.duration)
-        return tuple(inner)
-
-
-@final
-class FilmSpec(Value):
-    """The film: which instants it shows and how fast it plays.
-
-    Parameters
-    ----------
-    start : float, s
-        Instant of the first frame.
-    duration : float, s
-        Time that passes in the scene from the first frame to the end of the last.
-    frames : int
-        Number of frames.
-    fps : int, s-1
-        Frames per second when played.
-    """
-
-    start: Annotated[float, Field(ge=0, json_schema_extra={"unit": "s"})] = 0.0
-    duration: Annotated[float, Field(gt=0, json_schema_extra={"unit": "s"})] = 5.0
-    frames: Annotated[int, Field(ge=1, le=1_000_000)] = 125
-    fps: Annotated[int, Field(ge=1, le=240)] = 25
-
-    @property
-    def times(self) -> tuple[float, ...]:
-        """Instants of the frames [s]."""
-        return tuple(self.start + self.duration * index / self.frames for index in range(self.frames))
+__all__ = ["Scene", "builtin_scenes", "load"]
 
 
 @final
 class Scene(Value):
     """A whole experiment: the air, how it is heated, how light crosses it, and what is seen.
 
-    The same model is the TOML file, this class, and what the command line's ``--set`` changes.
+    It is the TOML file, this class, and what the command line's ``--set`` changes.
 
     Parameters
     ----------
@@ -191,9 +127,7 @@ class Scene(Value):
             return cls.from_toml(text, file=name, overrides=overrides)
         path = Path(name).expanduser()
         if not path.is_file():
-            raise InputError(
-                "no such scene or file", file=name, remedy=nearest(name, _builtin_names())
-            )
+            raise InputError("no such scene or file", file=name, remedy=nearest(name, _builtin_names()))
         return cls.from_toml(read_text(path), file=name, folder=path.resolve().parent, overrides=overrides)
 
     @classmethod
@@ -217,10 +151,7 @@ class Scene(Value):
         return self.from_toml(self.to_toml(), overrides=overrides)
 
     def to_toml(self, *, comments: bool = False) -> str:
-        """Write the scene as TOML that reads back into an equal scene.
-
-        With `comments`, unit and meaning stand beside each key.
-        """
+        """The scene as TOML that reads back equal; with `comments`, units and meanings stand beside keys."""
         return to_toml(self, comments=comments)
 
     @classmethod
@@ -279,7 +210,7 @@ class Scene(Value):
     ) -> Path:
         """Heat the air and write it to ``.zarr`` or ``.nc``, instant by instant.
 
-        Holds one instant at a time, so that the dataset may be larger than the memory.
+        One instant is held at a time: the dataset may be larger than the memory.
         """
         from nigemizu.scene import running
 
@@ -304,7 +235,7 @@ class Scene(Value):
         air: AirSource = None,
         method: str | None = None,
         samples: int | None = None,
-        variant: str = "auto",
+        variant: Variant = "auto",
         progress: ProgressMeter = SILENT,
     ) -> RenderedPicture:
         """Render one picture.
@@ -339,7 +270,7 @@ class Scene(Value):
         *,
         time: float | None = None,
         air: AirSource = None,
-        variant: str = "auto",
+        variant: Variant = "auto",
         command: str = "",
         progress: ProgressMeter = SILENT,
     ) -> list[Path]:
@@ -369,7 +300,7 @@ class Scene(Value):
         method: str | None = None,
         samples: int | None = None,
         workers: int = 1,
-        variant: str = "auto",
+        variant: Variant = "auto",
         command: str = "",
         progress: ProgressMeter = SILENT,
     ) -> Path:
@@ -408,7 +339,7 @@ class Scene(Value):
         air: AirSource = None,
         method: str | None = None,
         paths: bool = True,
-        variant: str = "auto",
+        variant: Variant = "auto",
         progress: ProgressMeter = SILENT,
     ) -> TracedRays:
         """Follow single rays from the eye.

@@ -67,7 +67,9 @@ def _draw(rays: TracedRays, path: Path, command: str) -> Path:
     from nigemizu.output.diagram import vanishing_line
 
     if not rays.paths:
-        raise InputError("these rays were traced without their paths", key="paths", remedy="trace(paths=True)")
+        raise InputError(
+            "these rays were traced without their paths", key="paths", remedy="trace(paths=True)"
+        )
     scene = rays.scene
     outlines = _outlines(scene)
     reach = _reach(scene, outlines)
@@ -98,7 +100,9 @@ def _side_view(rays: TracedRays, reach: float) -> list[DiagramRay]:
         if not inside.all():
             # The part beyond is not drawn: the ray leaves the figure between two of its points.
             first = int(np.argmin(inside))
-            z = np.append(z, np.interp(reach, distance[first - 1 : first + 1], points[first - 1 : first + 1, 2]))
+            z = np.append(
+                z, np.interp(reach, distance[first - 1 : first + 1], points[first - 1 : first + 1, 2])
+            )
             x, ending = np.append(x, reach), "escaped"
         views.append(DiagramRay(x, z, ending))
     return views

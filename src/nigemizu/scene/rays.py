@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from nigemizu.errors import InputError
 from nigemizu.progress import ProgressMeter
 from nigemizu.scene.rendering import Studio
-from nigemizu.scene.running import AirSource, AirVolume, air_at
+from nigemizu.scene.running import AirSource, AirVolume, Variant, air_at
 
 if TYPE_CHECKING:
     import xarray
@@ -81,7 +81,9 @@ class TracedRays:
                 "status": status,
                 "end": self.end[ray].tolist(),
                 "end_direction": self.end_direction[ray].tolist(),
-                "turning_height": None if math.isnan(self.turning_height[ray]) else float(self.turning_height[ray]),
+                "turning_height": None
+                if math.isnan(self.turning_height[ray])
+                else float(self.turning_height[ray]),
                 "optical_path": float(self.optical_path[ray]),
                 "steps": int(self.steps[ray]),
             }
@@ -100,7 +102,11 @@ class TracedRays:
         meanings = " ".join(_STATUSES).replace("-", "_")
         columns: dict[str, Any] = {
             "elevation": ("ray", self.elevation, {"units": "degree", "long_name": "elevation at the eye"}),
-            "azimuth": ("ray", self.azimuth, {"units": "degree", "long_name": "azimuth from the camera's heading"}),
+            "azimuth": (
+                "ray",
+                self.azimuth,
+                {"units": "degree", "long_name": "azimuth from the camera's heading"},
+            ),
             "status": ("ray", codes, {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": meanings}),
             "turning_height": ("ray", self.turning_height, {"units": "m"}),
             "optical_path": ("ray", self.optical_path, {"units": "m"}),
@@ -120,7 +126,7 @@ class TracedRays:
         return _trace_through(self.scene, self.air, *_fan(self.scene, elevations, None), "auto", paths=True)
 
     def save(self, path: str | os.PathLike[str], *, command: str = "") -> Path:
-        """Write ``.csv``, ``.nc``, or the ray diagram as ``.svg``, ``.png`` or ``.pdf``, and return where it is."""
+        """Write ``.csv``, ``.nc``, or the ray diagram (``.svg``, ``.png``, ``.pdf``); return where it is."""
         from nigemizu.scene.ray_files import save
 
         return save(self, Path(path), command)
@@ -134,7 +140,7 @@ def trace(
     time: float | None,
     air: AirSource,
     paths: bool,
-    variant: str,
+    variant: Variant,
     progress: ProgressMeter,
 ) -> TracedRays:
     """See `nigemizu.scene.Scene.trace`."""
@@ -146,7 +152,7 @@ def trace(
 
 
 def _trace_through(
-    scene: Scene, air: AirVolume, elevation: FloatArray, azimuth: FloatArray, variant: str, *, paths: bool
+    scene: Scene, air: AirVolume, elevation: FloatArray, azimuth: FloatArray, variant: Variant, *, paths: bool
 ) -> TracedRays:
     from nigemizu.trace import RayStatus
 
@@ -193,7 +199,9 @@ def _fan(
         limit = 90.0 if key == "elevation" else 360.0
         if not values.size or not np.all(np.abs(values) <= limit):
             wrong = None if not values.size else float(values[np.argmax(~(np.abs(values) <= limit))])
-            raise InputError("no angle", key=key, value=wrong, expected=f"degrees from -{limit:g} to {limit:g}")
+            raise InputError(
+                "no angle", key=key, value=wrong, expected=f"degrees from -{limit:g} to {limit:g}"
+            )
     return np.tile(rising, turning.size), np.repeat(turning, rising.size)
 
 

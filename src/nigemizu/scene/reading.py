@@ -117,13 +117,15 @@ def _index(place: list[Any], part: str, dotted: str) -> int:
     return int(part)
 
 
-def validate(model: type[_Model], data: Mapping[str, Any], *, file: str | None, folder: Path | None) -> _Model:
+def validate(
+    model: type[_Model], data: Mapping[str, Any], *, file: str | None, folder: Path | None
+) -> _Model:
     """Make `model` from `data`.
 
     Raises
     ------
     InputError
-        In one line: the file, the dotted key, the value, what was expected, and the remedy where one is known.
+        In one line: the file, the dotted key, the value, what was expected, and the remedy if one is known.
     """
     try:
         return model.model_validate(dict(data), context={"folder": folder})
@@ -137,14 +139,14 @@ def validate(model: type[_Model], data: Mapping[str, Any], *, file: str | None, 
 def _one_line(error: ValidationError, data: Mapping[str, Any], file: str | None) -> InputError:
     found: dict[str, list[dict[str, Any]]] = {}
     for entry in error.errors(include_url=False):
-        item = dict(entry)
+        item: dict[str, Any] = dict(entry)
         found.setdefault(_dotted_key(item, data), []).append(item)
     # A union reports one error per alternative. The alternative that got furthest is the one that was meant.
     key = max(found, key=lambda dotted: (_is_specific(found[dotted]), dotted.count(".")))
     items = found[key]
     specific = [item for item in items if not _MISMATCH.search(item["type"])]
     item = (specific or items)[0]
-    context = item.get("ctx", {})
+    context: dict[str, Any] = item.get("ctx", {})
     remedy = context.get("remedy")
     # The other alternatives of a union, and what only follows from this error, are no further mistakes.
     others = sum(
@@ -173,9 +175,9 @@ def _dotted_key(item: Mapping[str, Any], data: Any) -> str:
     place: Any = data
     location = item["loc"]
     for position, part in enumerate(location):
-        if isinstance(place, Mapping) and part in place:
-            place = place[part]
-        elif isinstance(place, list | tuple) and isinstance(part, int) and part < len(place):
+        in_table = isinstance(place, Mapping) and part in place
+        in_list = isinstance(place, list | tuple) and isinstance(part, int) and part < len(place)
+        if in_table or in_list:
             place = place[part]
         elif item["type"] != "missing" or position != len(location) - 1:
             continue

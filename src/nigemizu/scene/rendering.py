@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, Final, final
 from nigemizu.errors import NigemizuWarning
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.scene.picture import RenderedPicture
-from nigemizu.scene.running import AirSource, AirVolume, air_at
+from nigemizu.scene.running import AirSource, AirVolume, Variant, air_at
 
 if TYPE_CHECKING:
     from nigemizu.scene.model import Scene
 
 __all__ = ["Studio", "render", "warn_of_lost_rays"]
 
-# Fewer lost rays than this cannot be seen in a picture.
-_SEEN_SHARE: Final = 1e-3
+# Up to a row of pixels at the horizon is nothing to warn of: over flat ground its light runs level for ever.
+_SEEN_SHARE: Final = 5e-3
 
 
 @final
@@ -32,7 +32,7 @@ class Studio:
         Compute device; one per process.
     """
 
-    def __init__(self, scene: Scene, variant: str) -> None:
+    def __init__(self, scene: Scene, variant: Variant) -> None:
         from nigemizu.render import Settings, build, integrator, select_variant
 
         select_variant(variant)
@@ -48,7 +48,9 @@ class Studio:
 
         return surface_query(self._built)
 
-    def shoot(self, air: AirVolume | None, *, frame: int = 0, progress: ProgressMeter = SILENT) -> RenderedPicture:
+    def shoot(
+        self, air: AirVolume | None, *, frame: int = 0, progress: ProgressMeter = SILENT
+    ) -> RenderedPicture:
         """Render the scene through `air` (None: no air); each `frame` draws its own random numbers."""
         from nigemizu.render import medium_of, picture
 
@@ -67,7 +69,7 @@ class Studio:
 
 
 def render(
-    scene: Scene, time: float | None, air: AirSource, variant: str, progress: ProgressMeter
+    scene: Scene, time: float | None, air: AirSource, variant: Variant, progress: ProgressMeter
 ) -> RenderedPicture:
     """See `nigemizu.scene.Scene.render`."""
     scene.check()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,20 @@ if TYPE_CHECKING:
     from nigemizu.heat import State
     from nigemizu.scene.model import Scene
 
-__all__ = ["AirSource", "AirVolume", "air_at", "air_instants", "open_air", "require_within", "save_air", "simulate"]
+__all__ = [
+    "AirSource",
+    "AirVolume",
+    "Variant",
+    "air_at",
+    "air_instants",
+    "open_air",
+    "require_within",
+    "save_air",
+    "simulate",
+]
 
 AirSource: TypeAlias = "xarray.Dataset | AirVolume | str | os.PathLike[str] | None"
+Variant: TypeAlias = Literal["auto", "llvm", "cuda"]
 FloatArray: TypeAlias = NDArray[np.float64]
 
 

@@ -74,7 +74,9 @@ def _simplest(content: Any) -> Any:
 
 
 def _is_table_list(content: Any) -> bool:
-    return isinstance(content, tuple | list) and bool(content) and all(isinstance(one, Value) for one in content)
+    return (
+        isinstance(content, tuple | list) and bool(content) and all(isinstance(one, Value) for one in content)
+    )
 
 
 def _literal(content: Any) -> str:
