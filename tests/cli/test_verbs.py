@@ -131,8 +131,8 @@ def test_trace_prints_rays_as_json(run: Run, small: tuple[str, ...]) -> None:
     assert all(set(ray) == keys for ray in rays)
     down = rays[0]
     assert down["status"] == "hit"
-    # 2° down from 1.8 m meets the ground 51.5 m away, and bends little on its way there
-    assert math.hypot(*down["end"][:2]) == pytest.approx(1.8 / math.tan(math.radians(2)), rel=0.02)
+    # 2° down from 1.3 m meets the ground 37.2 m away, and bends little on its way there
+    assert math.hypot(*down["end"][:2]) == pytest.approx(1.3 / math.tan(math.radians(2)), rel=0.02)
     assert down["end"][1] < 0 < rays[3]["end"][1]  # azimuth is positive to the left
     assert down["turning_height"] is None
 
