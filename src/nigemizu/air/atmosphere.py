@@ -45,13 +45,17 @@ class Atmosphere(Value):
     0.00024976
     """
 
-    surface_pressure: Annotated[float, Field(ge=1.0, le=1e7)] = 101325.0
-    relative_humidity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    humidity_temperature: Annotated[float, Field(ge=150.0, le=370.0)] | None = None
-    co2_fraction: Annotated[float, Field(ge=0.0, le=0.1)] = 450e-6
-    wavelength: Annotated[float, Field(ge=300e-9, le=1700e-9)] = 550e-9
+    surface_pressure: Annotated[float, Field(ge=1.0, le=1e7, json_schema_extra={"unit": "Pa"})] = 101325.0
+    relative_humidity: Annotated[float, Field(ge=0.0, le=1.0, json_schema_extra={"unit": "1"})] = 0.0
+    humidity_temperature: Annotated[float, Field(ge=150.0, le=370.0)] | None = Field(
+        None, json_schema_extra={"unit": "K"}
+    )
+    co2_fraction: Annotated[float, Field(ge=0.0, le=0.1, json_schema_extra={"unit": "1"})] = 450e-6
+    wavelength: Annotated[float, Field(ge=300e-9, le=1700e-9, json_schema_extra={"unit": "m"})] = 550e-9
     model: Literal["ciddor1996", "lehn1978", "gladstone-dale", "edlen-nist"] = "ciddor1996"
-    gladstone_dale_constant: Annotated[float, Field(gt=0.0, le=0.01)] | None = None
+    gladstone_dale_constant: Annotated[float, Field(gt=0.0, le=0.01)] | None = Field(
+        None, json_schema_extra={"unit": "m3/kg"}
+    )
 
     @model_validator(mode="after")
     def _constant_belongs_to_model(self) -> Self:

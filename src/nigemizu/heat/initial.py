@@ -30,7 +30,7 @@ REACH: Final = 11
 
 @final
 class Unevenness(Value):
-    r"""Reproducible unevenness of the air: a Gaussian random field with a Gaussian correlation.
+    """Reproducible unevenness of the air: a Gaussian random field with a Gaussian correlation.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Unevenness(Value):
         Root mean square over many seeds (a single field with few blobs differs from it).
     length : (float, float, float), m
         Correlation lengths along x, y, z: the covariance at distance r along one of them is
-        :math:`\sigma^2 \exp(-r^2 / 2 l^2)`. At least two cells along every axis.
+        amplitude² exp(−r² / 2 length²). At least two cells along every axis.
     seed : int
         Every seed is another field; the same seed gives the same field, whatever the number of cells.
     depth : float, optional, m

@@ -26,21 +26,21 @@ def _check_table(heights: tuple[float, ...], values: tuple[float, ...], name: st
 
 @final
 class Diffusivity(Value):
-    r"""How fast heat spreads in the air, as a function of height.
+    """How fast heat spreads in the air, as a function of height.
 
     Parameters
     ----------
     kind : {"molecular", "eddy", "table"}
-        ``molecular``: the same everywhere. ``eddy``:
-        :math:`\alpha + \kappa u_* \max(0, \min(z, z_\text{cap}) - z_\text{sub})`, the mixing of turbulent
-        air above a sublayer at the ground in which eddies have no room. ``table``: linear between `heights`.
+        ``molecular``: the same everywhere. ``eddy``: molecular + 0.4 friction_velocity (z − sublayer), never
+        below molecular and constant above cap_height: the mixing of turbulent air above a sublayer at the
+        ground in which eddies have no room. ``table``: linear between `heights`.
     molecular : float, m2 s-1
-        Molecular diffusivity of heat, :math:`\alpha`; 2.2e-5 in air at 300 K.
+        Molecular diffusivity of heat; 2.2e-5 in air at 300 K.
     friction_velocity : float, m s-1
-        :math:`u_*` of ``eddy``.
+        Friction velocity u∗ of ``eddy``.
     sublayer : float, m
-        Thickness :math:`z_\text{sub}` of the layer next to the ground in which only molecules carry heat:
-        of the order of ten times the kinematic viscosity (1.6e-5 m2/s) over :math:`u_*`, some millimetres.
+        Thickness of the layer next to the ground in which only molecules carry heat: of the order of ten
+        times the kinematic viscosity (1.6e-5 m2/s) over u∗, some millimetres.
     cap_height : float, m
         Height above which the eddies' diffusivity stays constant.
     heights, values : tuple of float, m and m2 s-1
@@ -53,7 +53,7 @@ class Diffusivity(Value):
     Notes
     -----
     Limits: an eddy diffusivity describes the mean of turbulent air in neutral stratification with the
-    constant of von Kármán :math:`\kappa = 0.4`; it makes no eddies of its own, and buoyancy is left out.
+    constant of von Kármán κ = 0.4; it makes no eddies of its own, and buoyancy is left out.
 
     Examples
     --------
@@ -110,7 +110,7 @@ class Diffusivity(Value):
         return vertical * along_x, vertical * along_y
 
     def resistance(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        r"""Resistance :math:`\int dz / K(z)` [s m-1] of the air between two heights [m].
+        """Resistance ∫ dz / K(z) [s m-1] of the air between two heights [m].
 
         Gauss–Legendre quadrature with 12 nodes between the kinks of the diffusivity: exact to round-off.
         """

@@ -45,7 +45,7 @@ class Light(Value):
         Linear radiance of the ``gradient`` and ``constant`` skies, relative to each other.
     visibility : float, m, optional
         Meteorological range of the haze: the distance at which 2 % of an object's contrast is left
-        (Koschmieder). None: perfectly clear air.
+        (Koschmieder). Left out: perfectly clear air.
     """
 
     sky: Literal["sunsky", "gradient", "constant"] = "sunsky"

@@ -92,8 +92,10 @@ class Pyramid(Value):
     ----------
     position : (x, y, z), m
         Middle of the base.
-    base, height : float, m
-        Side of the base; height of the top above it.
+    base : float, m
+        Side of the base.
+    height : float, m
+        Height of the top above the base.
     rotation : float, degrees
         About the vertical, positive to the left; at 0 one face looks back at the camera.
     material : Material
@@ -168,8 +170,8 @@ class Mesh(Value):
         Where the file's origin goes.
     rotation : float, degrees
         About the vertical, positive to the left, after `up`.
-    scale : float
-        Metres per unit of the file.
+    scale : float, m
+        Length of one unit of the file.
     up : {"z", "y"}
         Which axis of the file points up.
     material : Material
@@ -180,7 +182,7 @@ class Mesh(Value):
     file: Path
     position: Position = (0.0, 0.0, 0.0)
     rotation: Degrees = 0.0
-    scale: Annotated[float, Field(gt=0)] = 1.0
+    scale: Length = 1.0
     up: Literal["z", "y"] = "z"
     material: Material = Colour()
 

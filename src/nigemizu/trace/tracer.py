@@ -20,7 +20,9 @@ class Tracer(Value):
         description="bent: through the refractive-index volume; straight: no refraction; "
         "layered: through panes of constant index (Berger et al. 1990)",
     )
-    step: float = Described(1.0, gt=0, description="interval along the ray between turns, m")
+    step: float = Described(
+        1.0, gt=0, description="interval along the ray between turns", json_schema_extra={"unit": "m"}
+    )
     max_steps: int = Described(5000, ge=1, description="most intervals (layered: panes) per ray")
     stepper: Literal["euler", "leapfrog", "yoshida4", "suzuki4"] = Described(
         "leapfrog",
@@ -45,7 +47,12 @@ class Tracer(Value):
         description="layered: panes with equal jumps of the index between them, or of equal thickness",
     )
     waviness_amplitude: float = Described(
-        0.0, ge=0, description="layered: rms height of the waves on the panes, m"
+        0.0,
+        ge=0,
+        description="layered: rms height of the waves on the panes",
+        json_schema_extra={"unit": "m"},
     )
-    waviness_length: float = Described(1.0, gt=0, description="layered: wavelength of the waves, m")
+    waviness_length: float = Described(
+        1.0, gt=0, description="layered: wavelength of the waves", json_schema_extra={"unit": "m"}
+    )
     waviness_seed: int = Described(0, ge=0, description="layered: seed of the waves")
