@@ -88,12 +88,14 @@ def test_everything_is_named(tmp_path):
         "height above the ground (m)",
         "temperature (°C)",
         "vanishing line: below it nothing is seen",
+        "the ground is seen",
+        "“water”: no ground is seen",
         "turned back up by the hot air",
         "to the ground or an object",
         "to the sky",
     ):
         assert expected in words
-    assert any(word.startswith("heights ×") for word in words)
+    assert any(word.startswith("heights exaggerated ×") for word in words)
     assert "a = 1" in path.read_text(encoding="utf-8")
 
 

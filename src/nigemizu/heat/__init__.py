@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         Sides,
         Top,
     )
-    from nigemizu.heat.dataset import complete, read_air, refractivity_at, to_dataset
+    from nigemizu.heat.dataset import complete, mean_temperature_at, read_air, refractivity_at, to_dataset
     from nigemizu.heat.grid import Grid, GridSpec, available_memory, require_memory
     from nigemizu.heat.initial import Initial, ProfileTable, Unevenness
     from nigemizu.heat.quantity import (
@@ -62,6 +62,7 @@ __all__ = [
     "available_memory",
     "complete",
     "evolve",
+    "mean_temperature_at",
     "read_air",
     "refractivity_at",
     "require_memory",
@@ -71,7 +72,7 @@ __all__ = [
 
 _HOMES: Final = {
     "boundary": ("ExchangeGround", "FluxGround", "GroundBoundary", "HeldGround", "Sides", "Top"),
-    "dataset": ("complete", "read_air", "refractivity_at", "to_dataset"),
+    "dataset": ("complete", "mean_temperature_at", "read_air", "refractivity_at", "to_dataset"),
     "solver": ("State", "evolve", "solve"),
     "grid": ("Grid", "GridSpec", "available_memory", "require_memory"),
     "initial": ("Initial", "ProfileTable", "Unevenness"),

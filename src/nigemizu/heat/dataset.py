@@ -17,7 +17,7 @@ from nigemizu.heat.reading import read_air
 if TYPE_CHECKING:
     from nigemizu.heat.grid import Grid
 
-__all__ = ["UNBOUNDED", "complete", "read_air", "refractivity_at", "to_dataset"]
+__all__ = ["UNBOUNDED", "complete", "mean_temperature_at", "read_air", "refractivity_at", "to_dataset"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -253,6 +253,33 @@ def refractivity_at(
     return x, y, z, np.ascontiguousarray(full)
 
 
+def mean_temperature_at(dataset: xr.Dataset, time: float) -> FloatArray | None:
+    """Horizontal mean of the temperature at the heights of `refractivity_at`, linear in time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As `to_dataset`, `complete` or `read_air` return it.
+    time : float, s
+        Any, when the dataset has no time axis.
+
+    Returns
+    -------
+    (nz,) ndarray of float64, K, or None
+        The skin of the ground first, when it is known. None when only the refractivity is stored.
+
+    Raises
+    ------
+    InputError
+        The time is outside the range of the dataset.
+    """
+    if "air_temperature" not in dataset:
+        return None
+    lower, upper, weight = _bracket(dataset, time)
+    before, after = (_mean_nodes(_at(dataset, index)) for index in (lower, upper))
+    return before + weight * (after - before)
+
+
 _Index: TypeAlias = tuple[int, ...]
 
 
@@ -306,7 +333,7 @@ def _nodes(dataset: xr.Dataset, index: _Index, atmosphere: Atmosphere) -> tuple[
         return z, _shaped(instant["air_refractivity"])
     temperature, pressure, humidity = _state(instant, atmosphere)
     air = atmosphere.refractivity(temperature, pressure, relative_humidity=humidity)
-    if "surface_temperature" not in instant or z[0] <= 0.0:
+    if not _has_skin(instant):
         return z, air
     surface = _shaped(instant["surface_temperature"].expand_dims("z"))
     # The air below the first node is hydrostatic too, at that node's temperature.
@@ -318,6 +345,18 @@ def _nodes(dataset: xr.Dataset, index: _Index, atmosphere: Atmosphere) -> tuple[
     shape = np.broadcast_shapes(air.shape[1:], ground.shape[1:])
     joined = [np.broadcast_to(part, (part.shape[0], *shape)) for part in (ground, air)]
     return np.concatenate([[0.0], z]), np.concatenate(joined)
+
+
+def _has_skin(instant: xr.Dataset) -> bool:
+    """Whether the skin of the ground is a node of its own below the others."""
+    return "surface_temperature" in instant and float(instant["z"][0]) > 0.0
+
+
+def _mean_nodes(instant: xr.Dataset) -> FloatArray:
+    means = _shaped(instant["air_temperature"]).mean(axis=(1, 2))
+    if not _has_skin(instant):
+        return np.asarray(means)
+    return np.concatenate([[float(instant["surface_temperature"].mean())], means])
 
 
 def _horizontal(dataset: xr.Dataset, axis: str) -> FloatArray:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from nigemizu.output.air import write_air
-    from nigemizu.output.diagram import DiagramRay, Outline, Profile, ray_diagram, vanishing_line
+    from nigemizu.output.diagram import ray_diagram
     from nigemizu.output.files import ready_to_write, whole_file, whole_folder
     from nigemizu.output.film import write_film
     from nigemizu.output.frames import FrameFolder
     from nigemizu.output.pictures import encoded, read_picture, write_exr, write_picture, write_png
     from nigemizu.output.provenance import Provenance
+    from nigemizu.output.side_view import DiagramRay, Outline, Profile, vanishing_line
 
 __all__ = [
     "DiagramRay",
@@ -39,12 +40,13 @@ __all__ = [
 
 _HOMES: Final = {
     "air": ("write_air",),
-    "diagram": ("DiagramRay", "Outline", "Profile", "ray_diagram", "vanishing_line"),
+    "diagram": ("ray_diagram",),
     "files": ("ready_to_write", "whole_file", "whole_folder"),
     "film": ("write_film",),
     "frames": ("FrameFolder",),
     "pictures": ("encoded", "read_picture", "write_exr", "write_picture", "write_png"),
     "provenance": ("Provenance",),
+    "side_view": ("DiagramRay", "Outline", "Profile", "vanishing_line"),
 }
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,15 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from nigemizu.errors import InputError
 from nigemizu.output.files import write_bytes
 from nigemizu.output.provenance import Provenance
+from nigemizu.output.side_view import DiagramRay, Outline, Profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["DiagramRay", "Outline", "Profile", "ray_diagram", "vanishing_line"]
+__all__ = ["ray_diagram"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
-Kind: TypeAlias = Literal["turned", "direct", "sky", "lost"]
 
 _COLOURS: Final = {"turned": "#c8442b", "direct": "#2a6f97", "sky": "#8fb3c9", "lost": "#b0b0b0"}
 _NAMES: Final = {
@@ -36,106 +35,8 @@ _GROUND: Final = "#d9c7a3"
 _OBJECT: Final = "#b08d57"
 _POINTS: Final = 600  # per ray; more cannot be seen
 
-
-@final
-@dataclass(frozen=True, eq=False)
-class DiagramRay:
-    """A ray as a polyline from the eye.
-
-    Parameters
-    ----------
-    x : (n,) float64, m
-        Distances.
-    z : (n,) float64, m
-        Heights.
-    status : {"hit", "escaped", "out-of-steps"}
-        How the ray ended.
-    """
-
-    x: FloatArray
-    z: FloatArray
-    status: str
-
-    def kind(self) -> Kind:
-        """``"turned"`` when the ray came down and went up again; otherwise by its end."""
-        lowest = int(np.argmin(self.z))
-        span = float(np.ptp(self.z))
-        if 0 < lowest < self.z.size - 1 and self.z[-1] > self.z[lowest] + 1e-6 * span:
-            return "turned"
-        return {"hit": "direct", "escaped": "sky"}.get(self.status, "lost")  # type: ignore[return-value]
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Outline:
-    """The silhouette of an object from the side.
-
-    Parameters
-    ----------
-    name : str
-    x, z : (n,) float64, m
-        Corners in order.
-    """
-
-    name: str
-    x: FloatArray
-    z: FloatArray
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Profile:
-    """The air over one place.
-
-    Parameters
-    ----------
-    height : (n,) float64, m
-    refractivity : (n,) float64, 1
-        n − 1.
-    temperature : (n,) float64, K, optional
-    """
-
-    height: FloatArray
-    refractivity: FloatArray
-    temperature: FloatArray | None = None
-
-
-def vanishing_line(rays: Sequence[DiagramRay], *, samples: int = 400) -> tuple[FloatArray, FloatArray]:
-    """Lowest height that can be seen at each distance: the lower envelope of a dense bundle of rays.
-
-    Parameters
-    ----------
-    rays : sequence of DiagramRay
-        From one eye, with elevations close together.
-    samples : int
-        Distances at which the envelope is taken.
-
-    Returns
-    -------
-    x : (m,) ndarray of float64, m
-    z : (m,) ndarray of float64, m
-        From the distance where the ground disappears to the end of the rays; both empty when the ground is
-        seen to the end.
-
-    Notes
-    -----
-    Limits: the envelope of a finite bundle, above the true line by as much as neighbouring rays are apart.
-    """
-    grounded = [ray for ray in rays if ray.status == "hit" and ray.z[-1] <= 1e-3 * ray.z[0]]
-    others = [ray for ray in rays if not any(ray is other for other in grounded)]
-    if not others:
-        return np.empty(0), np.empty(0)
-    begin = max(float(ray.x[-1]) for ray in grounded) if grounded else float(others[0].x[0])
-    distances = np.linspace(begin, max(float(ray.x[-1]) for ray in others), samples)
-    heights = np.array([np.interp(distances, ray.x, ray.z, left=np.inf, right=np.inf) for ray in others])
-    lowest, nearest = heights.min(axis=0), heights.argmin(axis=0)
-    # Where the lowest ray meets an object the line ends; what is higher up goes on, but limits nothing.
-    stopped = ~np.isfinite(heights[nearest[:-1], np.arange(1, samples)])
-    length = int(np.argmax(stopped)) + 1 if stopped.any() else samples
-    # Up to where the limiting ray comes down the ground is seen; there the line begins.
-    place = np.arange(samples)
-    seen = np.isfinite(lowest) & (place < length) & (place >= int(np.argmin(lowest[:length])))
-    return distances[seen], lowest[seen]
+_STRIP: Final = 0.065  # depth of the ground that is drawn, in heights of the figure
+_LETTER: Final = 0.0085  # width of a letter there, in widths of the figure
 
 
 def ray_diagram(
@@ -208,6 +109,8 @@ def ray_diagram(
         if vanishing is not None:
             _draw_vanishing(main, np.asarray(vanishing[0]), np.asarray(vanishing[1]), upper)
         _finish(figure, main, rays, objects, place, upper, title, with_label=profile is None)
+        if vanishing is not None:
+            _name_ground(main, np.asarray(vanishing[0]), place[0], upper)
         buffer = io.BytesIO()
         figure.savefig(buffer, format=kind[1:], dpi=160, metadata=_metadata(kind, provenance or Provenance()))
     return write_bytes(target, buffer.getvalue())
@@ -308,6 +211,27 @@ def _draw_vanishing(axes: Axes, x: FloatArray, z: FloatArray, upper: float) -> N
     )
 
 
+def _name_ground(axes: Axes, x: FloatArray, eye: float, upper: float) -> None:
+    """Say within the ground which part of it is seen, where the words have room."""
+    if not x.size:
+        return
+    letter = _LETTER * float(np.ptp(axes.get_xlim()))
+    for begin, end, words in (
+        (eye, x[0], "the ground is seen"),
+        (x[0], x[-1], "“water”: no ground is seen"),
+    ):
+        if end - begin > len(words) * letter:
+            axes.annotate(
+                words,
+                (0.5 * (begin + end), -0.5 * _STRIP * upper),
+                ha="center",
+                va="center",
+                fontsize=8.5,
+                color="#4d3a1e",
+                zorder=6,
+            )
+
+
 def _finish(
     figure: Figure,
     axes: Axes,
@@ -322,8 +246,8 @@ def _finish(
     ends = [float(np.max(ray.x)) for ray in rays if ray.kind() != "sky"] or [float(rays[0].x[-1])]
     far = max([*ends, *(float(np.max(outline.x)) for outline in objects)])
     left = eye[0] - 0.03 * (far - eye[0])
-    axes.set_xlim(left, far + 0.01 * (far - eye[0]))
-    axes.set_ylim(-0.045 * upper, upper)
+    axes.set_xlim(left, far + 0.03 * (far - eye[0]))
+    axes.set_ylim(-_STRIP * upper, upper)
     axes.axhspan(-upper, 0.0, color=_GROUND, zorder=2.5, lw=0)
     axes.axhline(0.0, color="#8a744a", lw=1.0, zorder=4)
     axes.plot(*eye, marker="o", ms=7, mfc="white", mec=_INK, mew=1.5, zorder=7)
@@ -366,7 +290,7 @@ def _finish(
     box = axes.get_window_extent()
     width, height = np.ptp(axes.get_xlim()) / box.width, np.ptp(axes.get_ylim()) / box.height
     axes.annotate(
-        f"heights × {_two_digits(width / height)}",
+        f"heights exaggerated × {_two_digits(width / height)}",
         (1.0, 1.0),
         xycoords="axes fraction",
         xytext=(0, 4),

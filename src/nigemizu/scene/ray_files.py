@@ -63,8 +63,7 @@ def _write_csv(rays: TracedRays, path: Path) -> Path:
 
 
 def _draw(rays: TracedRays, path: Path, command: str) -> Path:
-    from nigemizu.output import Provenance, ray_diagram
-    from nigemizu.output.diagram import vanishing_line
+    from nigemizu.output import Provenance, ray_diagram, vanishing_line
 
     if not rays.paths:
         raise InputError(
@@ -111,7 +110,7 @@ def _side_view(rays: TracedRays, reach: float) -> list[DiagramRay]:
 def _profile(rays: TracedRays) -> Profile:
     from nigemizu.output import Profile
 
-    return Profile(rays.air.z, rays.air.refractivity.mean(axis=(1, 2)))
+    return Profile(rays.air.z, rays.air.refractivity.mean(axis=(1, 2)), rays.air.temperature)
 
 
 def _outlines(scene: Scene) -> list[Outline]:

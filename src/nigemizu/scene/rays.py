@@ -29,7 +29,7 @@ FloatArray = NDArray[np.float64]
 _FAN: Final = 41  # rays of the fan that is traced when no elevations are given
 _GRAZING: Final = (-1.0, 0.25)  # degrees; what air can turn lies here
 _STATUSES: Final = ("hit", "escaped", "out-of-steps")
-_POINTS: Final = 200  # points kept along a path, about
+_POINTS: Final = 2000  # points kept along a path, about
 
 
 @final
@@ -220,7 +220,7 @@ def _follow(
     from nigemizu.render import medium_of
 
     tracer, surface = scene.tracer, studio.surfaces
-    through = medium_of(*air, tracer=tracer, precision="double")
+    through = medium_of(*air[:4], tracer=tracer, precision="double")
     types = through.types
     origin = types.Array3f(*(types.Float(np.full(len(directions), place)) for place in scene.camera.eye))
     ahead = types.Array3f(*(types.Float(np.ascontiguousarray(column)) for column in directions.T))

@@ -55,7 +55,7 @@ class Studio:
         from nigemizu.render import medium_of, picture
 
         scene = self._scene
-        self._integrator.set_medium(None if air is None else medium_of(*air, tracer=scene.tracer))
+        self._integrator.set_medium(None if air is None else medium_of(*air[:4], tracer=scene.tracer))
         camera = scene.camera
         taken = picture(
             self._built,

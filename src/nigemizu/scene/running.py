@@ -45,12 +45,15 @@ class AirVolume(NamedTuple):
         Positions of the nodes.
     refractivity : (nz, ny, nx) float64, 1
         n − 1 at the nodes.
+    temperature : (nz,) float64, K, optional
+        Horizontal mean, for the profile beside a ray diagram; the rays do not need it.
     """
 
     x: FloatArray
     y: FloatArray
     z: FloatArray
     refractivity: FloatArray
+    temperature: FloatArray | None = None
 
 
 def simulate(scene: Scene, times: tuple[float, ...], progress: ProgressMeter) -> xarray.Dataset:
@@ -89,7 +92,7 @@ def air_instants(
     scene: Scene, times: tuple[float, ...], air: AirSource, progress: ProgressMeter
 ) -> Iterator[AirVolume]:
     """The air at each of the instants, one after another; only one is held."""
-    from nigemizu.heat import refractivity_at, to_dataset
+    from nigemizu.heat import to_dataset
 
     if isinstance(air, AirVolume):  # air that does not change
         yield from (air for _ in times)
@@ -99,12 +102,17 @@ def air_instants(
         dataset = open_air(air)
         require_within(dataset, times)
         for time in times:
-            yield AirVolume(*refractivity_at(dataset, time, scene.air))
+            yield _volume(scene, dataset, time)
         return
     grid = scene.grid.build()
     for state in _states(scene, times, progress):
-        instant = to_dataset(grid, [state])
-        yield AirVolume(*refractivity_at(instant, state.time, scene.air))
+        yield _volume(scene, to_dataset(grid, [state]), state.time)
+
+
+def _volume(scene: Scene, dataset: xarray.Dataset, time: float) -> AirVolume:
+    from nigemizu.heat import mean_temperature_at, refractivity_at
+
+    return AirVolume(*refractivity_at(dataset, time, scene.air), mean_temperature_at(dataset, time))
 
 
 def open_air(air: xarray.Dataset | str | os.PathLike[str]) -> xarray.Dataset:
