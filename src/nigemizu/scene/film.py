@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from nigemizu.errors import MachineError
 from nigemizu.progress import SILENT, ProgressMeter
+from nigemizu.scene.digest import air_digest
 from nigemizu.scene.rendering import Studio, warn_of_lost_rays
 from nigemizu.scene.running import AirSource, AirVolume, Variant, air_instants, open_air, require_within
 
@@ -51,9 +52,12 @@ def animate(
     shown = scene.model_copy(
         update={"title": "", "description": "", "film": scene.film.model_copy(update={"fps": 1})}
     )
-    inputs = {"air": str(air)} if isinstance(air, str | os.PathLike) else None
+    digest = air_digest(air)
     folder = FrameFolder(
-        frames_folder(path), scene.film.frames, Provenance(scene=shown.to_toml()), inputs=inputs
+        frames_folder(path),
+        scene.film.frames,
+        Provenance(scene=shown.to_toml()),
+        inputs=None if digest is None else {"air": digest},
     )
     missing = folder.missing()
     progress.start("frames", folder.count)
