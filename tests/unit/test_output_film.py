@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from nigemizu.errors import InputError, MachineError
-from nigemizu.output import FrameFolder, Provenance, read_picture, write_film, write_png
+from nigemizu.output import FrameFolder, Provenance, encoded, read_picture, write_film, write_png
 
 SCENE = Provenance(scene='title = "road"\n[camera]\nsamples = 16\n', command="nigemizu animate road")
 
@@ -189,4 +189,4 @@ def test_full_disk_leaves_no_film(tmp_path, monkeypatch):
 
 def test_frames_read_back(folder):
     folder.write(0, np.full((4, 6, 3), 0.18))
-    assert read_picture(folder.frame(0)).tolist() == np.full((4, 6, 3), 118).tolist()
+    assert np.array_equal(read_picture(folder.frame(0)), encoded(np.full((4, 6, 3), 0.18)))

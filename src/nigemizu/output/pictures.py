@@ -44,8 +44,11 @@ def encoded(
 
     Notes
     -----
-    s = 12.92 c for c ≤ 0.0031308, else 1.055 c^(1/2.4) − 0.055 (IEC 61966-2-1:1999), rounded to the nearest
-    of 255 steps. Soft: c → k + (1 − k)(1 − exp(−(c − k)/(1 − k))) above k = 0.8, per channel. Limits: an
+    s = 12.92 c for c ≤ 0.0031308, else 1.055 c^(1/2.4) − 0.055 (IEC 61966-2-1:1999), in 255 steps.
+    Between two steps a pixel takes the upper one with the probability that keeps the mean: rounding to the
+    nearest would draw contour lines into a smooth sky. The dither is a hash of row, column and channel, the
+    same in every picture, so that films stay calm; what lies exactly on a step, as black and white do, stays
+    there. Soft: c → k + (1 − k)(1 − exp(−(c − k)/(1 − k))) above k = 0.8, per channel. Limits: an
     exposure and a transfer curve, no film look and no gamut mapping.
 
     Examples
@@ -62,7 +65,20 @@ def encoded(
         linear = np.where(over > 0.0, _KNEE + (1.0 - _KNEE) * -np.expm1(-np.maximum(over, 0.0)), linear)
     np.minimum(linear, 1.0, out=linear)
     curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
-    return np.asarray(curve * 255.0 + 0.5).astype(np.uint8)
+    curve[linear == 1.0] = 1.0  # which the formula misses by a rounding error
+    return np.asarray(curve * 255.0 + _dither(*curve.shape)).astype(np.uint8)
+
+
+def _dither(rows: int, columns: int, channels: int) -> NDArray[np.float64]:
+    """Numbers from 0 to 1 (excluded), each a hash of its place: (rows, columns, channels)."""
+    row, column, channel = np.ogrid[:rows, :columns, :channels]
+    mixed = (row * 0x9E3779B1 + column * 0x85EBCA77 + channel * 0xC2B2AE3D).astype(np.uint32)
+    # The finalizer of MurmurHash3: every bit of the place changes half of the bits of the hash.
+    for shift, factor in ((16, 0x85EBCA6B), (13, 0xC2B2AE35)):
+        mixed ^= mixed >> np.uint32(shift)
+        mixed *= np.uint32(factor)
+    mixed ^= mixed >> np.uint32(16)
+    return np.asarray(mixed * 2.0**-32)
 
 
 def write_png(
