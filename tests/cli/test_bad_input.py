@@ -224,6 +224,16 @@ def test_llvm_that_cannot_be_used(
     assert run("simulate", "pyramid", "-o", "gone/air.nc").err.count("LLVM") == 0
 
 
+@pytest.mark.parametrize(("typed", "lines"), [(["check", "pyramid"], 0), (["doctor"], 0), (["bench"], 1)])
+def test_llvm_named_by_the_user_that_is_not_there(program: Run, typed: list[str], lines: int) -> None:
+    # A process of its own: Dr.Jit looks for LLVM while it is imported, and complains in its own words.
+    started = program(*typed, DRJIT_LIBLLVM_PATH="gone.so")
+    out, err = started.communicate(timeout=60)
+    assert started.returncode == (0 if typed[0] == "check" else 2)
+    assert len(err.splitlines()) == lines
+    assert ("unset DRJIT_LIBLLVM_PATH" in out + err) == (typed[0] != "check")
+
+
 def test_debug_shows_where_it_happened(run: Run) -> None:
     done = run("render", "piramid", "--debug")
     assert done.code == 2

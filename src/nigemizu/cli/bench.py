@@ -103,9 +103,15 @@ def picture_times(size: tuple[int, int] = (480, 270), samples: int = 16) -> dict
 
 
 def run_all() -> dict[str, Any]:
-    """Every benchmark; rates in 1/s, times in s."""
+    """Every benchmark and the machine it ran on; rates in 1/s, times in s."""
+    from nigemizu.cli.doctor import examine
+
+    found = examine()
     copied, heated, marched, seconds = copy_rate(), heat_rate(), march_rate(), picture_times()
     return {
+        "machine": {
+            key: found[key] for key in ("processor", "cores", "platform", "python", "nigemizu", "llvm")
+        },
         "memory_copy_bytes_per_second": copied,
         "heat_cell_updates_per_second": heated,
         # one update reads and writes the temperature once at the very least
@@ -119,7 +125,10 @@ def run_all() -> dict[str, Any]:
 
 def table(results: dict[str, Any]) -> str:
     """The results as lines to read."""
+    machine = results["machine"]
     rows = [
+        ("machine", f"{machine['cores']} cores of {machine['processor']}, {machine['platform']}"),
+        ("nigemizu", f"{machine['nigemizu']}, LLVM {machine['llvm']['version']}, Python {machine['python']}"),
         ("memory copied", f"{results['memory_copy_bytes_per_second'] / 1e9:.1f} GB/s"),
         ("heat stage", f"{results['heat_cell_updates_per_second'] / 1e6:.1f} million cell-updates/s"),
         ("  of the copying limit", f"{results['heat_share_of_memory_copy']:.1%}"),

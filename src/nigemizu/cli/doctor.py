@@ -6,6 +6,7 @@ its version is asked for and nothing is compiled.
 
 from __future__ import annotations
 
+import importlib
 import importlib.metadata
 import os
 import platform
@@ -13,11 +14,12 @@ import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Final
 
 from nigemizu.errors import MachineError
 
-__all__ = ["demand_backend", "examine", "find_backends", "report"]
+__all__ = ["demand_backend", "examine", "find_backends", "import_compiler", "report"]
 
 OLDEST_LLVM: Final = 16
 _PACKAGES: Final = (
@@ -43,9 +45,9 @@ def examine() -> dict[str, Any]:
     dict
         JSON-ready; ``can_render`` says whether pictures can be made here, ``remedy`` what to do if not.
     """
-    from nigemizu.scene.memory import memory_available
-
     version, cuda = find_backends()
+    from nigemizu.scene.memory import memory_available  # imports what find_backends has made silent
+
     state = _llvm_state(version)
     can_render = state == "found" or cuda
     return {
@@ -60,6 +62,7 @@ def examine() -> dict[str, Any]:
             "library": os.environ.get("DRJIT_LIBLLVM_PATH"),
         },
         "cuda": cuda,
+        "processor": _processor(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
         "memory_available": memory_available(),
         "disk_free": shutil.disk_usage(os.getcwd()).free,
@@ -77,7 +80,7 @@ def report(found: dict[str, Any]) -> str:
         ("packages", ", ".join(f"{name} {version}" for name, version in found["packages"].items())),
         ("LLVM", f"{llvm['state']} {llvm['version'] or ''} (needed {llvm['needed']})".replace("  ", " ")),
         ("CUDA", "usable" if found["cuda"] else "no usable device"),
-        ("cores", str(found["cores"])),
+        ("cores", f"{found['cores']} of {found['processor']}"),
         ("memory", _gigabytes(found["memory_available"]) + " available"),
         ("disk", _gigabytes(found["disk_free"]) + " free here"),
         ("pictures", "can be rendered" if found["can_render"] else "cannot be rendered"),
@@ -87,12 +90,19 @@ def report(found: dict[str, Any]) -> str:
     return "\n".join(f"{name:9} {text}" for name, text in rows)
 
 
-def find_backends() -> tuple[tuple[int, ...] | None, bool]:
-    """Version of LLVM (None: missing) and whether CUDA is usable.
+def import_compiler() -> None:
+    """Import Dr.Jit without its words about what this machine lacks.
 
-    Dr.Jit complains about what it does not find straight to the process's stderr, in its own words; nigemizu
-    says it in one line, so those words are kept away.
+    It writes them straight to the process's stderr, already while it is imported; nigemizu says the same in
+    one line, and only where a compiler is needed.
     """
+    with _hushed():
+        importlib.import_module("drjit")
+
+
+def find_backends() -> tuple[tuple[int, ...] | None, bool]:
+    """Version of LLVM (None: missing) and whether CUDA is usable."""
+    import_compiler()
     import drjit
 
     with _hushed():
@@ -139,6 +149,8 @@ def _hushed() -> Iterator[None]:
 
 
 def _remedy(state: str) -> str:
+    if os.environ.get("DRJIT_LIBLLVM_PATH"):  # taken before any that is installed
+        return "DRJIT_LIBLLVM_PATH names the wrong library; type: unset DRJIT_LIBLLVM_PATH"
     if sys.platform == "darwin":
         return "type: brew install llvm"
     if shutil.which("apt-get"):
@@ -147,6 +159,15 @@ def _remedy(state: str) -> str:
         return "type: sudo dnf install llvm-libs"
     verb = "install" if state == "missing" else "update"
     return f"{verb} LLVM {OLDEST_LLVM} or newer and set DRJIT_LIBLLVM_PATH to its shared library"
+
+
+def _processor() -> str:
+    names = Path("/proc/cpuinfo")  # what Python itself calls the processor is only its family
+    if names.exists():
+        for line in names.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
 
 
 def _gigabytes(amount: int | None) -> str:

@@ -117,6 +117,9 @@ def trace(options: argparse.Namespace) -> int:
 
 def scenes(options: argparse.Namespace) -> int:
     """``nigemizu scenes``."""
+    from nigemizu.cli.doctor import import_compiler
+
+    import_compiler()
     from nigemizu.scene import builtin_scenes
 
     listed = builtin_scenes()
@@ -134,11 +137,9 @@ def show(options: argparse.Namespace) -> int:
 
 def check(options: argparse.Namespace) -> int:
     """``nigemizu check``."""
-    from nigemizu.scene import Scene
-
-    overrides = _overrides(options)
+    scene_class, overrides = _scene_class(), _overrides(options)
     for name in options.scene:
-        scene = Scene.load(name, overrides)
+        scene = scene_class.load(name, overrides)
         with _naming(name):
             scene.check()
         nz, ny, nx = scene.grid.cells[::-1]
@@ -150,9 +151,7 @@ def check(options: argparse.Namespace) -> int:
 
 def schema(options: argparse.Namespace) -> int:
     """``nigemizu schema``."""
-    from nigemizu.scene import Scene
-
-    print(json.dumps(Scene.json_schema(), indent=2, ensure_ascii=False))
+    print(json.dumps(_scene_class().json_schema(), indent=2, ensure_ascii=False))
     return 0
 
 
@@ -168,16 +167,25 @@ def doctor(options: argparse.Namespace) -> int:
 def bench(options: argparse.Namespace) -> int:
     """``nigemizu bench``."""
     from nigemizu.cli.bench import run_all, table
+    from nigemizu.cli.doctor import demand_backend
 
+    demand_backend("llvm")
     results = run_all()
     print(json.dumps(results, indent=2) if options.json else table(results))
     return 0
 
 
-def _scene(options: argparse.Namespace) -> Scene:
+def _scene_class() -> type[Scene]:
+    from nigemizu.cli.doctor import import_compiler
+
+    import_compiler()  # a scene names the stages, which need it
     from nigemizu.scene import Scene
 
-    return Scene.load(options.scene, _overrides(options))
+    return Scene
+
+
+def _scene(options: argparse.Namespace) -> Scene:
+    return _scene_class().load(options.scene, _overrides(options))
 
 
 @contextmanager

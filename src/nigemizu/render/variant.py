@@ -63,9 +63,10 @@ def select_variant(backend: Literal["auto", "llvm", "cuda"] = "auto") -> str:
             f"the Mitsuba variant {wanted} is set, and nigemizu renders under "
             f"{' and '.join(_VARIANTS.values())} only"
         )
+    # Dr.Jit aborts the process inside an old LLVM, which Python cannot catch: look before compiling, also
+    # under a variant that the caller has set.
+    field.types("cuda" if wanted == _VARIANTS["cuda"] else "llvm")
     if current is None:
-        # Dr.Jit aborts the process inside an old LLVM, which Python cannot catch: look before compiling.
-        field.types("cuda" if wanted == _VARIANTS["cuda"] else "llvm")
         mi.set_variant(wanted)
         # What a person must know comes as an error or warning of ours; Mitsuba would write to stdout.
         mi.set_log_level(mi.LogLevel.Error)
