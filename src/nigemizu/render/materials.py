@@ -53,7 +53,8 @@ class Sand(Value):
     contrast : float
         Relative strength of the unevenness (0 = even).
     scale : float, m
-        Length of the coarsest patches; finer ones follow down to a decimetre.
+        Length of the coarsest patches along x; across they are a sixteenth as wide, as drifts are. Finer ones
+        follow down to a few centimetres, ever rounder.
     seed : int
         Seed of the pattern.
     """

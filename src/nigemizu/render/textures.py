@@ -18,7 +18,11 @@ __all__ = ["texture_classes"]
 
 _TILE: Final = 512  # texels of the noise tile
 _PERIOD: Final = 8  # texels per wavelength of its noise
-_FINEST: Final = 0.1  # m, shortest wavelength of ground noise
+_FINEST: Final = 0.02  # m, shortest wavelength of ground noise, across the view
+_GRAIN: Final = 0.5  # m, below which noise loses its direction
+_DRIFT: Final = 16.0  # sand lies in drifts, so many times longer (along x) than wide
+_WEAR: Final = 40.0  # the same of the marks that wheels leave on a road
+_RIPPLE: Final = 0.25  # m, from crest to crest
 
 
 def noise_tile(seed: int) -> NDArray[np.float32]:
@@ -64,12 +68,19 @@ def texture_classes(variant: str) -> dict[str, Any]:
             c, s = float(np.cos(turn)) * scale, float(np.sin(turn)) * scale
             return self.tile.eval(mi.Point2f(c * x - s * y + 0.37 * turn, s * x + c * y + 0.61 * turn))[0]
 
-        def octaves(self, si: Any, across: Any, coarsest: float, finest: float) -> Any:
-            """Sum of ever finer noise; what is finer than a pixel fades away."""
+        def octaves(
+            self, si: Any, wide: tuple[Any, Any], coarsest: float, finest: float, stretch: float
+        ) -> Any:
+            """Sum of ever finer noise; what is finer than a pixel fades away.
+
+            Patches are up to `stretch` times longer along x; grain has no direction.
+            """
             total, length, turn = mi.Float(0), coarsest, 0.3
             while length >= finest:
-                visible = dr.exp(-((across / (0.5 * length)) ** 2))
-                total += 0.4 * visible * self.noise(si.p.x, si.p.y, length, turn)
+                longer = 1 + (stretch - 1) * min(length / _GRAIN, 1.0)
+                reach = (wide[0] / longer) ** 2 + wide[1] ** 2
+                visible = dr.exp(-reach / (0.5 * length) ** 2)
+                total += 0.3 * visible * self.noise(si.p.x / longer, si.p.y, length, turn)
                 length, turn = length / 2.9, turn + 1.1
             return total
 
@@ -108,8 +119,11 @@ def texture_classes(variant: str) -> dict[str, Any]:
             self.gap = float(props.get("gap", 9.0))
 
         def pattern(self, si: Any) -> Any:
-            across, wide_x, wide_y = self.footprint(si)
-            uneven = self.octaves(si, across, self.scale, _FINEST)
+            _, wide_x, wide_y = wide = self.footprint(si)
+            uneven = self.octaves(si, wide[1:], self.scale / _DRIFT, _FINEST, _DRIFT)
+            # Wind ripples across the line of sight, an even tone wherever a pixel covers some of them.
+            ripples = self.noise(si.p.x / _RIPPLE, si.p.y / 5 / _RIPPLE, 1.0, 0.05)
+            uneven += 0.3 * dr.exp(-((wide_x / (0.5 * _RIPPLE)) ** 2)) * ripples
             # Bright sand is a little yellower than dark sand.
             tint = mi.Color3f(1.0, 0.97, 0.9)
             sand = self.colour * (1 + self.contrast * uneven * tint)
@@ -117,17 +131,17 @@ def texture_classes(variant: str) -> dict[str, Any]:
                 return sand
             y = si.p.y - self.centre
             half = self.road / 2
-            # The edge of the asphalt crumbles, as far as a pixel shows it.
-            wander = 0.06 * dr.exp(-((wide_x / 2.0) ** 2)) * self.noise(si.p.x, y, 2.5, 0.7)
-            on_road = _strip(dr.abs(y) + wander, -half, half, wide_y)
-            return dr.lerp(sand, self.road_surface(si, y, across, wide_x, wide_y), on_road)
+            # The edge of the asphalt crumbles: sand and stones lie on it here and there.
+            crumbs = 0.15 * self.octaves(si, wide[1:], 0.5, 0.04, 30.0)
+            on_road = _strip(dr.abs(y) + crumbs, -half, half, wide_y + 0.25)
+            return dr.lerp(sand, self.road_surface(si, y, wide_x, wide_y), on_road)
 
-        def road_surface(self, si: Any, y: Any, across: Any, wide_x: Any, wide_y: Any) -> Any:
+        def road_surface(self, si: Any, y: Any, wide_x: Any, wide_y: Any) -> Any:
             half, lane = self.road / 2, self.road / 4
             # Wheels polish two tracks per lane, and oil darkens the stripe between them.
             from_lane = dr.abs(dr.abs(y) - lane)
             tracks = dr.exp(-(((from_lane - 0.8) / 0.3) ** 2)) - 0.6 * dr.exp(-((from_lane / 0.35) ** 2))
-            grain = self.octaves(si, across, 9.0, 0.02)
+            grain = self.octaves(si, (wide_x, wide_y), 0.4, 0.01, _WEAR)
             surface = self.asphalt * (1 + 0.12 * tracks + self.grain * grain)
             edge = half - self.inset
             lines = _strip(dr.abs(y), edge - self.line, edge, wide_y)
