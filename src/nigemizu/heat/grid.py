@@ -129,7 +129,7 @@ class GridSpec(Value):
     height : float, m
         Height of the box above the ground.
     cells : (int, int, int)
-        Number of cells ``(nx, ny, nz)``.
+        Number of cells along x, y and z.
     first_cell : float, optional, m
         Height of the lowest cell. The cells above it grow by a constant ratio, found so that the top is
         at `height`. Left out, all cells have the same height.

@@ -19,7 +19,13 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 
 @final
 class Colour(Value):
-    """One matt colour."""
+    """One matt colour.
+
+    Parameters
+    ----------
+    colour : (r, g, b)
+        Reflectance.
+    """
 
     kind: Literal["colour"] = "colour"
     colour: Reflectance = (0.5, 0.5, 0.5)
@@ -68,7 +74,17 @@ class Sand(Value):
 
 @final
 class Asphalt(Value):
-    """Dark, finely grained road surface."""
+    """Dark, finely grained road surface.
+
+    Parameters
+    ----------
+    colour : (r, g, b)
+        Mean reflectance.
+    contrast : float
+        Relative strength of the unevenness (0 = even).
+    seed : int
+        Seed of the pattern.
+    """
 
     kind: Literal["asphalt"] = "asphalt"
     colour: Reflectance = (0.085, 0.085, 0.09)

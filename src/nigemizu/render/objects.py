@@ -45,9 +45,11 @@ class Road(Value):
         Width of the painted lines.
     edge_inset : float, m
         Distance from the edge of the asphalt to the outer rim of the edge lines.
-    dash, gap : float, m
-        Length of the dashes of the centre line and of the gaps between them (6 m and 9 m: German
-        guidelines for road markings outside built-up areas have dashes of 4 m to 6 m).
+    dash : float, m
+        Length of the dashes of the centre line. German guidelines for road markings outside built-up areas
+        have 4 m to 6 m.
+    gap : float, m
+        Length of the gaps between the dashes.
     surface : Asphalt
         The asphalt.
     line_colour : (r, g, b)
@@ -112,7 +114,19 @@ class Pyramid(Value):
 
 @final
 class Box(Value):
-    """A rectangular box; `position` is the middle of its base, `size` its lengths along x, y and z (m)."""
+    """A rectangular box.
+
+    Parameters
+    ----------
+    position : (x, y, z), m
+        Middle of the base.
+    size : (x, y, z), m
+        Lengths of the sides, before the rotation.
+    rotation : float, degrees
+        About the vertical, positive to the left.
+    material : Material
+        What it is made of.
+    """
 
     kind: Literal["box"] = "box"
     position: Position
@@ -132,8 +146,10 @@ class Pole(Value):
     ----------
     position : (x, y, z), m
         Its foot.
-    height, diameter : float, m
-        Its size.
+    height : float, m
+        From the foot to the top.
+    diameter : float, m
+        Its thickness.
     bands : int
         Number of bands of equal height, the lowest in the first colour, the next in the second, ...
     colours : two (r, g, b)
@@ -150,7 +166,17 @@ class Pole(Value):
 
 @final
 class Sphere(Value):
-    """A sphere; `position` is its middle."""
+    """A sphere.
+
+    Parameters
+    ----------
+    position : (x, y, z), m
+        Its middle.
+    radius : float, m
+        Half its thickness.
+    material : Material
+        What it is made of.
+    """
 
     kind: Literal["sphere"] = "sphere"
     position: Position
