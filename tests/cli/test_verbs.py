@@ -144,7 +144,10 @@ def test_trace_writes_tables_and_diagrams(run: Run, small: tuple[str, ...]) -> N
     rows = Path("rays.csv").read_text().splitlines()
     assert len(rows) == 10
     assert rows[0].startswith("elevation,azimuth,status,")
-    assert "<svg" in Path("rays.svg").read_text()[:500]
+    drawn = Path("rays.svg").read_text(encoding="utf-8")
+    assert "<svg" in drawn[:500]
+    assert "<!-- temperature (°C) -->" in drawn
+    assert 'id="object pyramid"' in drawn
 
 
 def test_scenes_lists_the_built_in_ones(run: Run) -> None:

@@ -8,7 +8,7 @@ import xarray as xr
 
 from nigemizu.air import Atmosphere, refractivity
 from nigemizu.errors import InputError
-from nigemizu.heat import Grid, complete, refractivity_at, to_dataset
+from nigemizu.heat import Grid, complete, mean_temperature_at, refractivity_at, to_dataset
 
 GRID = Grid(np.linspace(0, 8, 9), np.linspace(-2, 2, 5), np.linspace(0, 1, 6) ** 2)
 AIR = Atmosphere()
@@ -88,6 +88,20 @@ def test_the_ground_is_the_lowest_node():
     _, _, z, values = refractivity_at(to_dataset(GRID, states(surface=False)), 0.0, AIR)
     assert np.array_equal(z, GRID.z)
     assert values.shape == GRID.shape
+
+
+def test_mean_temperature_goes_with_the_nodes():
+    """The skin first where it is known, linear in time, nothing where only the refractivity is stored."""
+    data = to_dataset(GRID, states())
+    air = data["air_temperature"].values.mean(axis=(2, 3))
+    found = mean_temperature_at(data, 15.0)
+    assert found.size == refractivity_at(data, 15.0, AIR)[2].size
+    assert found[0] == 330.0
+    assert found[1:] == pytest.approx(0.75 * air[1] + 0.25 * air[2], rel=1e-14)
+    assert mean_temperature_at(to_dataset(GRID, states(surface=False)), 0.0) == pytest.approx(air[0])
+    assert mean_temperature_at(complete(data, AIR)[["air_refractivity"]], 0.0) is None
+    with pytest.raises(InputError, match="from 0 s to 30 s"):
+        mean_temperature_at(data, 31.0)
 
 
 def test_stored_pressure_and_humidity_win():
