@@ -193,7 +193,7 @@ def integrator_class(variant: str) -> Any:
                 ray = mi.Ray3f(next_ray)
                 active = onward | passed
 
-            return dr.select(valid | True, L, 0), valid | self.shows_environment(scene), []
+            return L, valid | self.shows_environment(scene), []
 
         def horizon_radiance(self, scene: Any, ray: Any, active: Any) -> Any:
             """Radiance of the sky at the horizon, in the azimuth of `ray`."""
