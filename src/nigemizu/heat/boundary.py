@@ -28,7 +28,7 @@ class HeldGround(Value):
     Parameters
     ----------
     temperature : Quantity, K
-        Constant, in time, in place.
+        Of the skin: a number, or a course in time and a pattern in place.
     """
 
     kind: Literal["held"] = "held"
@@ -41,8 +41,8 @@ class HeldGround(Value):
 
 
 class _HeatPerVolume(Value):
-    density: float = Field(default=1.177, gt=0)
-    specific_heat: float = Field(default=1006.0, gt=0)
+    density: float = Field(default=1.177, gt=0, json_schema_extra={"unit": "kg/m3"})
+    specific_heat: float = Field(default=1006.0, gt=0, json_schema_extra={"unit": "J/kg/K"})
 
     @property
     def heat_capacity(self) -> float:
@@ -102,8 +102,11 @@ GroundBoundary = Annotated[HeldGround | FluxGround | ExchangeGround, Field(discr
 class Sides(Value):
     """What lies beyond the sides.
 
-    ``periodic``: the air that leaves on one side comes in on the other. ``insulated``: no heat is
-    conducted through the side; wind that blows in carries the temperature of the outermost cell.
+    Parameters
+    ----------
+    x, y : {"periodic", "insulated"}
+        ``periodic``: what leaves on one side comes in on the other. ``insulated``: no heat is conducted
+        through the side; wind that blows in carries the temperature of the outermost cell.
     """
 
     x: Literal["periodic", "insulated"] = "periodic"
