@@ -171,3 +171,33 @@ def test_daily_course_is_second_order_in_the_step():
     ]
     errors = [float(np.max(np.abs(result - results[-1]))) for result in results[:-1]]
     assert abs(slope(steps, errors) - 2) < 0.2, errors
+
+
+def exchange_errors(cells, steps, delay=0.0, measure=np.max):
+    """Errors against a fine run with a coefficient and a temperature of the ground that have their courses.
+
+    With a delay of half a step, the middle of a step takes the coefficient of its start.
+    """
+
+    def run(step):
+        grid = GridSpec(x=(0, 1), y=(0, 1), height=0.3, cells=(1, 1, cells)).build()
+        coefficient = Daily(mean=6, amplitude=4, time_of_maximum=10 + delay * step, period=60)
+        ground = ExchangeGround(
+            coefficient=Quantity(daily=coefficient),
+            temperature=Quantity(daily=Daily(mean=320, amplitude=20, time_of_maximum=25, period=60)),
+        )
+        return last(grid, 310.0, 48.0, ground=ground, time_step=step).temperature
+
+    exact = run(steps[-1] / 16)
+    return [float(measure(np.abs(run(step) - exact))) for step in steps]
+
+
+@pytest.mark.parametrize(("cells", "measure"), [(16, np.max), (48, np.mean)])
+def test_coefficient_with_a_course_is_second_order_in_the_step(cells, measure):
+    # The lowest of 16 cells relaxes in 8 s. The lowest of 48 relaxes in 0.9 s, faster than a step, and lags
+    # behind the coefficient by half a step: there the order shows in the mean over all cells.
+    steps = [1.5, 0.75, 0.375]
+    errors = exchange_errors(cells, steps, measure=measure)
+    assert abs(slope(steps, errors) - 2) < 0.2, errors
+    # the coefficient at the start of every step is of first order
+    assert abs(slope(steps, exchange_errors(cells, steps, delay=0.5, measure=measure)) - 1) < 0.2

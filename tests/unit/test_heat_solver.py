@@ -10,6 +10,7 @@ import pytest
 from nigemizu.errors import InputError
 from nigemizu.heat import (
     Diffusivity,
+    ExchangeGround,
     FluxGround,
     GridSpec,
     HeldGround,
@@ -83,6 +84,8 @@ def test_automatic_step():
     assert choose_time_step(GRID, **{**calm, "wind": Wind(speed=4.0)}) == pytest.approx(0.5)
     table = HeldGround(temperature=Quantity(schedule=Schedule(times=(0, 3, 5), values=(300, 301, 302))))
     assert choose_time_step(GRID, **{**calm, "ground": table}) == 2.0
+    exchange = ExchangeGround(coefficient=table.temperature, temperature=300)
+    assert choose_time_step(GRID, **{**calm, "ground": exchange}) == 2.0 / 8
     eddies = Diffusivity(kind="eddy", friction_velocity=1.0, cap_height=10.0, horizontal_factor=100.0)
     highest = 100 * float(eddies.vertical(GRID.z[-1]))
     assert choose_time_step(GRID, **{**calm, "diffusivity": eddies}) == pytest.approx(4 / highest)

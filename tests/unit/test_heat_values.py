@@ -168,6 +168,22 @@ def test_pattern_on_a_schedule_keeps_the_course_where_it_adds():
     assert quantity.bounds() == (300, 327)
 
 
+def test_bounds_hold_where_patches_overlap():
+    offsets = (Rectangle(x=(0, 4), y=(-2, 2), offset=-6), Disc(center=(4, 0), radius=2.0, offset=-6))
+    quantity = Quantity(value=10, patterns=(Patches(patches=offsets),))
+    assert quantity.at(grid(), 0.0).min() == -2
+    assert quantity.bounds() == (-2, 10)
+    with pytest.raises(ValidationError, match=r"coefficient: .* may reach -2"):
+        ExchangeGround(coefficient=quantity, temperature=300)
+
+
+def test_coefficient_of_exchange_takes_numbers_texts_and_courses():
+    for number in (12, "12 W/m2/K", {"value": 12}, {"schedule": {"times": (0, 1), "values": (12, 12)}}):
+        ground = ExchangeGround.model_validate({"coefficient": number, "temperature": 300})
+        assert ground.coefficient.at_time(0.5) == 12
+        assert ExchangeGround.model_validate(ground.model_dump()) == ground
+
+
 def test_image_is_seen_from_above(tmp_path):
     # upper row: black, white; lower row: white, white
     Pictures.fromarray(np.array([[0, 255], [255, 255]], dtype=np.uint8)).save(tmp_path / "map.png")
@@ -186,6 +202,13 @@ def test_sixteen_bit_images_keep_their_range(tmp_path):
     np.testing.assert_allclose(values, [[300, 310]])
 
 
+def test_images_beyond_their_range_are_refused(tmp_path):
+    Pictures.fromarray(np.array([[0.0, 0.5, 1.5]], dtype=np.float32)).save(tmp_path / "map.tiff")
+    image = Image(file=tmp_path / "map.tiff", values=(300, 310))
+    with pytest.raises(InputError, match=r"grey values.*0 to 1\.5.*between 0 \(black\) and 1 \(white\)"):
+        Quantity(value=300.0, patterns=(image,)).at(grid(), 0.0)
+
+
 def test_missing_and_broken_images_are_refused(tmp_path):
     (tmp_path / "text.png").write_text("no picture")
     for name, words in (("absent.png", "no such picture"), ("text.png", "cannot read the picture")):
@@ -200,7 +223,12 @@ def test_missing_and_broken_images_are_refused(tmp_path):
         (HeldGround, {"temperature": -5}, "kelvin"),
         (HeldGround, {"temperature": {"daily": {"mean": 10, "amplitude": 20}}}, "reaches -10"),
         (ExchangeGround, {"coefficient": 10, "temperature": 0}, "kelvin"),
-        (ExchangeGround, {"coefficient": -1, "temperature": 300}, "greater than 0"),
+        (ExchangeGround, {"coefficient": -1, "temperature": 300}, "coefficient: it is zero or positive"),
+        (
+            ExchangeGround,
+            {"coefficient": {"daily": {"mean": 5, "amplitude": 6}}, "temperature": 300},
+            "coefficient: .* may reach -1",
+        ),
         (FluxGround, {"heat_flux": math.nan}, "finite"),
         (FluxGround, {"heat_flux": 10, "density": 0}, "greater than 0"),
         (Quantity, {}, "exactly one"),

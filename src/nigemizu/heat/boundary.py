@@ -21,6 +21,12 @@ def _is_kelvin(name: str, quantity: Quantity) -> None:
         )
 
 
+def _is_not_negative(name: str, quantity: Quantity) -> None:
+    lowest = quantity.bounds()[0]
+    if lowest < 0:
+        raise ValueError(f"{name}: it is zero or positive everywhere and always, but may reach {lowest:g}")
+
+
 @final
 class HeldGround(Value):
     """Ground whose skin is held at a temperature.
@@ -76,8 +82,10 @@ class ExchangeGround(_HeatPerVolume):
 
     Parameters
     ----------
-    coefficient : float, W m-2 K-1
-        Of heat exchange, between what lies below and the air's skin.
+    coefficient : Quantity, W m-2 K-1
+        Of heat exchange, between what lies below and the air's skin; zero is an insulated wall. In the course
+        of time a step takes the value at its middle. Where a pattern has more than 64 values, columns are
+        interpolated between 64 levels (`nigemizu.heat.columns` bounds the error).
     temperature : Quantity, K
         Of what lies below.
     density, specific_heat : float
@@ -85,12 +93,13 @@ class ExchangeGround(_HeatPerVolume):
     """
 
     kind: Literal["exchange"] = "exchange"
-    coefficient: float = Field(gt=0, json_schema_extra={"unit": "W/m2/K"})
+    coefficient: Quantity = Field(json_schema_extra={"unit": "W/m2/K"})
     temperature: Quantity = Field(json_schema_extra={"unit": "K"})
 
     @model_validator(mode="after")
-    def _kelvin(self) -> Self:
+    def _possible(self) -> Self:
         _is_kelvin("temperature", self.temperature)
+        _is_not_negative("coefficient", self.coefficient)
         return self
 
 

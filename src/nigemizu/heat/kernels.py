@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["move_levels", "spread_columns"]
+__all__ = ["move_levels", "spread_columns", "spread_groups"]
 
 PAD = 3  # cells of padding on each side: the donor before the first cell, and two more
 
@@ -199,6 +199,33 @@ def move_levels(  # type: ignore[no-untyped-def]
 BLOCK = 128  # columns that are treated together: a block of a hundred levels fits into the second cache
 
 
+@njit(inline="always")
+def _multiply_row(row, begin, end, levels, block, line, count):  # type: ignore[no-untyped-def]
+    """One row of the matrix times the block, into `line`."""
+    rows = row.size
+    for m in range(count):
+        line[m] = 0.0
+    k = begin
+    while k < rows:
+        if k >= end and k < levels:
+            k = levels  # on to the boundaries
+            continue
+        # four levels in one sweep over the columns
+        if k + 4 <= end:
+            w0, w1, w2, w3 = row[k], row[k + 1], row[k + 2], row[k + 3]
+            for m in range(count):
+                line[m] += (
+                    w0 * block[k, m] + w1 * block[k + 1, m] + w2 * block[k + 2, m] + w3 * block[k + 3, m]
+                )
+            k += 4
+        else:
+            weight = row[k]
+            if weight != 0.0:
+                for m in range(count):
+                    line[m] += weight * block[k, m]
+            k += 1
+
+
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def spread_columns(matrix, begins, ends, air, result, first, last):  # type: ignore[no-untyped-def]
     """Multiply the columns ``first … last - 1`` of `air` by `matrix`.
@@ -225,28 +252,42 @@ def spread_columns(matrix, begins, ends, air, result, first, last):  # type: ign
             for m in range(count):
                 block[k, m] = air[k, corner + m]
         for i in range(levels):
-            for m in range(count):
-                line[m] = 0.0
-            k = begins[i]
-            while k < rows:
-                if k >= ends[i] and k < levels:
-                    k = levels  # on to the boundaries
-                # four levels in one sweep over the columns
-                if k + 4 <= ends[i]:
-                    w0, w1, w2, w3 = matrix[i, k], matrix[i, k + 1], matrix[i, k + 2], matrix[i, k + 3]
-                    for m in range(count):
-                        line[m] += (
-                            w0 * block[k, m]
-                            + w1 * block[k + 1, m]
-                            + w2 * block[k + 2, m]
-                            + w3 * block[k + 3, m]
-                        )
-                    k += 4
-                else:
-                    weight = matrix[i, k]
-                    if weight != 0.0:
-                        for m in range(count):
-                            line[m] += weight * block[k, m]
-                    k += 1
+            _multiply_row(matrix[i], begins[i], ends[i], levels, block, line, count)
             for m in range(count):
                 result[i, corner + m] = line[m]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def spread_groups(  # type: ignore[no-untyped-def]
+    matrices, begins, ends, firsts, columns, weights, air, result, first, last
+):
+    """Multiply the columns ``first … last - 1`` of `air` by weighted means of several matrices.
+
+    Parameters
+    ----------
+    matrices, begins, ends
+        As for `spread_columns`, stacked along a first axis of n.
+    firsts : (n + 1,) int64
+        Matrix g is applied to the columns ``columns[firsts[g]] … columns[firsts[g + 1] - 1]``.
+    columns : (entries,) int64
+        All of them between `first` and ``last - 1``.
+    weights : (entries,) float64
+        With which the product counts; those of one column sum to one.
+    air, result, first, last
+        As for `spread_columns`.
+    """
+    groups, levels, rows = matrices.shape
+    block, line = np.empty((rows, BLOCK)), np.empty(BLOCK)
+    for i in range(levels):
+        for column in range(first, last):
+            result[i, column] = 0.0
+    for g in range(groups):
+        for corner in range(firsts[g], firsts[g + 1], BLOCK):
+            count = min(BLOCK, firsts[g + 1] - corner)
+            for k in range(rows):
+                for m in range(count):
+                    block[k, m] = air[k, columns[corner + m]]
+            for i in range(levels):
+                _multiply_row(matrices[g, i], begins[g, i], ends[g, i], levels, block, line, count)
+                for m in range(count):
+                    result[i, columns[corner + m]] += weights[corner + m] * line[m]

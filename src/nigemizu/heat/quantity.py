@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, final
 
@@ -12,7 +12,7 @@ from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from nigemizu.errors import InputError
+from nigemizu.heat.grey import bilinear, read_grey
 from nigemizu.heat.grid import Grid
 from nigemizu.heat.measures import Degrees, Metres, Seconds
 from nigemizu.values import Value
@@ -154,6 +154,12 @@ class Patches(Value):
         for patch in self.patches:
             yield patch.value is not None, patch.value if patch.value is not None else patch.offset or 0.0
 
+    def bounds(self, low: float, high: float) -> tuple[float, float]:
+        """Numbers between which the quantity stays that stayed between `low` and `high`."""
+        for change in self.changes():  # one patch may lie on another: their offsets add up
+            low, high = _widened(low, high, [change])
+        return low, high
+
 
 @final
 class Stripes(Value):
@@ -197,6 +203,10 @@ class Stripes(Value):
         for number in self.values or self.offsets:
             yield bool(self.values), number
 
+    def bounds(self, low: float, high: float) -> tuple[float, float]:
+        """Numbers between which the quantity stays that stayed between `low` and `high`."""
+        return _widened(low, high, self.changes())
+
 
 @final
 class Image(Value):
@@ -229,20 +239,24 @@ class Image(Value):
 
     def apply(self, base: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """`base` with the picture laid on it; `base`, `x`, `y` are (ny, nx)."""
-        grey = _read_grey(self.file)
+        grey = read_grey(self.file)
         x_ends = self.x or _ends(x[0])
         y_ends = self.y or _ends(y[:, 0])
         column = (x - x_ends[0]) / (x_ends[1] - x_ends[0]) * grey.shape[1] - 0.5
         row = (y_ends[1] - y) / (y_ends[1] - y_ends[0]) * grey.shape[0] - 0.5
         inside = (x >= x_ends[0]) & (x <= x_ends[1]) & (y >= y_ends[0]) & (y <= y_ends[1])
         black, white = self.values or self.offsets or (0.0, 0.0)
-        mapped = black + (white - black) * _bilinear(grey, row, column)
+        mapped = black + (white - black) * bilinear(grey, row, column)
         return np.where(inside, mapped if self.values is not None else base + mapped, base)
 
     def changes(self) -> Iterator[tuple[bool, float]]:
         """Every change as (replaces?, number)."""
         for number in self.values or self.offsets or ():
             yield self.values is not None, number
+
+    def bounds(self, low: float, high: float) -> tuple[float, float]:
+        """Numbers between which the quantity stays that stayed between `low` and `high`."""
+        return _widened(low, high, self.changes())
 
 
 Pattern = Annotated[Patches | Stripes | Image, Field(discriminator="kind")]
@@ -332,47 +346,27 @@ class Quantity(Value):
 
     def bounds(self) -> tuple[float, float]:
         """Numbers between which the quantity stays, everywhere and always."""
-        course = self.schedule or self.daily
-        constant = 0.0 if self.value is None else self.value
-        low, high = (constant, constant) if course is None else course.bounds()
+        low, high = self.course_bounds()
         for pattern in self.patterns:
-            lowest, highest = low, high
-            for replaces, number in pattern.changes():
-                below, above = (number, number) if replaces else (low + number, high + number)
-                lowest, highest = min(lowest, below), max(highest, above)
-            low, high = lowest, highest
+            low, high = pattern.bounds(low, high)
         return low, high
 
+    def course_bounds(self) -> tuple[float, float]:
+        """Lowest and highest of `at_time`."""
+        if self.value is not None:
+            return self.value, self.value
+        course = self.schedule or self.daily
+        assert course is not None  # the validator holds it
+        return course.bounds()
 
-def _read_grey(file: Path) -> np.ndarray:
-    """Luminance of a picture, (rows, columns) float64 in 0..1, first row at the top."""
-    from PIL import Image as Pictures
-    from PIL import UnidentifiedImageError
 
-    path = file.expanduser()
-    try:
-        with Pictures.open(path) as picture:
-            deep = picture.mode.startswith("I") or picture.mode == "F"
-            grey = np.asarray(picture if deep else picture.convert("L"), dtype=np.float64)
-            return grey / (65535.0 if picture.mode.startswith("I") else 1.0 if picture.mode == "F" else 255.0)
-    except FileNotFoundError:
-        raise InputError("no such picture", key="pattern.file", value=str(file)) from None
-    except (UnidentifiedImageError, OSError) as error:
-        raise InputError(f"cannot read the picture: {error}", key="pattern.file", value=str(file)) from None
+def _widened(low: float, high: float, changes: Iterable[tuple[bool, float]]) -> tuple[float, float]:
+    """Bounds of what stays between `low` and `high` or undergoes one of the changes."""
+    ends = [(number, number) if replaces else (low + number, high + number) for replaces, number in changes]
+    return min(low, *(end[0] for end in ends)), max(high, *(end[1] for end in ends))
 
 
 def _ends(centres: np.ndarray) -> tuple[float, float]:
     # half a cell beyond the outer centres; a single cell counts as one metre wide
     half = 0.5 * (centres[1] - centres[0]) if centres.size > 1 else 0.5
     return float(centres[0] - half), float(centres[-1] + half)
-
-
-def _bilinear(grey: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    rows, columns = grey.shape
-    row, column = np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)
-    r0, c0 = np.floor(row).astype(np.int64), np.floor(column).astype(np.int64)
-    r1, c1 = np.minimum(r0 + 1, rows - 1), np.minimum(c0 + 1, columns - 1)
-    fr, fc = row - r0, column - c0
-    upper = (1 - fc) * grey[r0, c0] + fc * grey[r0, c1]
-    lower = (1 - fc) * grey[r1, c0] + fc * grey[r1, c1]
-    return np.asarray((1 - fr) * upper + fr * lower)

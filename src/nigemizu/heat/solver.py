@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from nigemizu.errors import InputError
-from nigemizu.heat.boundary import GroundBoundary, Sides, Top
+from nigemizu.heat.boundary import ExchangeGround, GroundBoundary, Sides, Top
 from nigemizu.heat.grid import Grid, available_memory, require_memory
-from nigemizu.heat.stepping import GroundCourse, State, Stepper, ground_quantity
+from nigemizu.heat.stepping import State, Stepper, ground_quantity
 from nigemizu.heat.transport import Diffusivity, Wind
-from nigemizu.heat.vertical import VerticalDiffusion
 from nigemizu.progress import SILENT, ProgressMeter
 
 if TYPE_CHECKING:
@@ -27,6 +26,9 @@ COURANT: Final = 2.0
 
 SPREADING: Final = 4.0
 """Horizontal diffusivity × step / cell² of an automatic step, where the diffusivity varies with height."""
+
+FOLLOWING: Final = 8
+"""Automatic steps in the time that follows a coefficient of exchange, which a step takes as constant."""
 
 
 def evolve(
@@ -87,7 +89,8 @@ def evolve(
     motion of every level and the vertical diffusion of every column, each of them without further error
     in time:
 
-    - vertical diffusion by the exponential of its matrix (`nigemizu.heat.vertical`),
+    - vertical diffusion by the exponential of its matrix (`nigemizu.heat.vertical`), with a coefficient of
+      exchange as at the middle of the step, by levels where it has many values (`nigemizu.heat.columns`),
     - horizontal diffusion by the discrete heat kernel (`nigemizu.heat.horizontal`),
     - transport by whole cells and a limited fifth-order flux for the rest (`nigemizu.heat.kernels`).
 
@@ -97,8 +100,10 @@ def evolve(
     step. Second order in step and cell where the temperature is smooth; the transport alone has order 2.5 in
     the mean error (5 away from extrema, where nothing is clipped).
 
-    Limits: no buoyancy, no radiation, no vertical wind. Schedules are linear within a step. A ground pattern
-    is as sharp as the cells. The limiter flattens peaks narrower than about four cells.
+    Limits: no buoyancy, no radiation, no vertical wind. Schedules are linear within a step; a coefficient of
+    exchange is constant within it, so that cells next to the ground that relax faster than a step lag behind
+    by half a step. A ground pattern is as sharp as the cells. The limiter flattens peaks narrower than about
+    four cells.
 
     References
     ----------
@@ -113,8 +118,7 @@ def evolve(
     require_memory(math.prod(grid.shape), available=available)
     initial = _check_temperature(grid, temperature)
     longest = time_step or choose_time_step(grid, ground, diffusivity, wind)
-    column = VerticalDiffusion.build(grid, diffusivity, ground, top)
-    stepper = Stepper(grid, initial, column, GroundCourse(grid, ground), top, diffusivity, wind, sides)
+    stepper = Stepper(grid, initial, ground, top, diffusivity, wind, sides)
     return _march(stepper, instants, start, longest, progress)
 
 
@@ -147,6 +151,8 @@ def choose_time_step(grid: Grid, ground: GroundBoundary, diffusivity: Diffusivit
     """
     heights = grid.z - grid.z_edges[0]
     limit = ground_quantity(ground).finest()
+    if isinstance(ground, ExchangeGround):
+        limit = min(limit, ground.coefficient.finest() / FOLLOWING)
     speeds, spreads = wind.velocity(heights), diffusivity.sideways(heights)
     for axis, count, speed, spread in zip("xy", grid.shape[:0:-1], speeds, spreads, strict=True):
         if count == 1:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
 from collections.abc import Callable, Sequence
@@ -14,9 +13,10 @@ import numpy as np
 
 from nigemizu.errors import InputError
 from nigemizu.heat.boundary import ExchangeGround, FluxGround, GroundBoundary, HeldGround, Sides, Top
+from nigemizu.heat.columns import ColumnSteps
 from nigemizu.heat.grid import Grid
 from nigemizu.heat.horizontal import HorizontalMotion
-from nigemizu.heat.kernels import move_levels, spread_columns
+from nigemizu.heat.kernels import move_levels
 from nigemizu.heat.quantity import Quantity
 from nigemizu.heat.transport import Diffusivity, Wind
 from nigemizu.heat.vertical import BOUNDARY_ROWS, VerticalDiffusion
@@ -71,14 +71,13 @@ class Stepper:
         self,
         grid: Grid,
         initial: np.ndarray,
-        column: VerticalDiffusion,
-        ground: GroundCourse,
+        ground: GroundBoundary,
         top: Top,
         diffusivity: Diffusivity,
         wind: Wind,
         sides: Sides,
     ) -> None:
-        self.grid, self.column, self.ground = grid, column, ground
+        self.grid, self.ground = grid, GroundCourse(grid, ground)
         self.diffusivity, self.wind, self.sides = diffusivity, wind, sides
         self.levels = grid.shape[0]
         # the levels as rows, followed by the ground's number before and after the step and by the top's
@@ -87,10 +86,11 @@ class Stepper:
         self.now[: self.levels] = initial.reshape(self.levels, -1)
         held = _top_temperature(grid, initial) if top.temperature is None else top.temperature
         self.now[-1] = self.next[-1] = held
-        self.columns: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self.motions: dict[float, HorizontalMotion] = {}
         self.y_first = False
         self.workers = _processors()
+        column = VerticalDiffusion.build(grid, diffusivity, ground, top)
+        self.columns = ColumnSteps(grid, column, ground, self.workers)
         self.pool: ThreadPoolExecutor | None = None
 
     def __enter__(self) -> None:
@@ -109,19 +109,9 @@ class Stepper:
         step = _rounded(end - time)
         if opens:
             self._move(0.5 * step)
-        if step not in self.columns:
-            matrix = self.column.step(step)
-            self.columns[step] = (matrix, *self.column.reach(matrix))
         self.ground.fill(self.now[self.levels], time)
         self.ground.fill(self.now[self.levels + 1], end)
-        corners = np.linspace(0, self.now.shape[1], self.workers + 1).astype(np.int64)
-        self._share(
-            spread_columns,
-            [
-                (*self.columns[step], self.now, self.next, first, last)
-                for first, last in itertools.pairwise(corners)
-            ],
-        )
+        self._share(*self.columns.work(step, 0.5 * (time + end), self.now, self.next))
         self.now, self.next = self.next, self.now
         self._move(0.5 * step if closes else step)
 
@@ -165,10 +155,9 @@ class Stepper:
                 key="ground.heat_flux",
                 remedy="a lasting negative flux takes more heat than the air can give",
             )
-        skin = np.empty(temperature[0].size)
-        self.ground.fill(skin, time)
-        skin *= self.column.skin_ground
-        skin += self.column.skin_air * temperature[0].ravel()
+        below = np.empty(temperature[0].size)
+        self.ground.fill(below, time)
+        skin = self.columns.skin(temperature[0].ravel(), below, time)
         return State(time, temperature, skin.reshape(self.grid.shape[1:]))
 
 

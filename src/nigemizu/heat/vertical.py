@@ -6,7 +6,9 @@ On every column of cells the heat equation in finite volumes is a linear system 
           \frac{T_i - T_{i-1}}{R_{i-1/2}}\right), \qquad R = \int \frac{dz}{K(z)},
 
 plus what the ground and the top add. Since `A` depends on height alone, one matrix :math:`e^{A \Delta t}`
-serves all columns, and a step is one product of matrices, stable like an implicit one. No implicit
+serves all columns above the same ground, and a step is one product of matrices, stable like an implicit one.
+Ground that is held or exchanges heat enters `A` by one number, the conductance `G` between the ground's
+temperature and the centre of the lowest cell. No implicit
 Runge–Kutta or multistep scheme of second order is free of new extrema at every step (Bolley and Crouzeix
 1978); the exponential is, because `A` has no negative element off its diagonal. It is computed without
 cancellation, as a sum of non-negative terms (uniformization) that is squared repeatedly.
@@ -19,13 +21,15 @@ C. Bolley, M. Crouzeix, RAIRO Analyse numérique 12, 237-245 (1978).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
 
-from nigemizu.heat.boundary import ExchangeGround, FluxGround, HeldGround, Top
+from nigemizu.heat.boundary import FluxGround, GroundBoundary, HeldGround, Top
 from nigemizu.heat.grid import Grid
+from nigemizu.heat.kernels import spread_columns
 from nigemizu.heat.transport import Diffusivity
 
 __all__ = ["BOUNDARY_ROWS", "VerticalDiffusion"]
@@ -44,27 +48,29 @@ TERMS: Final = 20
 @final
 @dataclass(frozen=True, eq=False)
 class VerticalDiffusion:
-    """The matrix of vertical diffusion and what the ground means for it.
+    """The matrix of vertical diffusion for any conductance between the ground and the lowest cell.
 
     Attributes
     ----------
     generator : (nz, nz) float64, s-1
-        `A`.
-    ground_source : float, per s and unit of the ground's number
-        What the ground adds to the lowest cell: per kelvin (held, exchange) or per W m-2 (flux).
+        `A` above insulated ground.
     top_source : float, s-1
         What the top adds to the highest cell per kelvin.
-    skin_air, skin_ground : float
-        The skin's temperature is ``skin_air × lowest cell + skin_ground × the ground's number``.
+    to_ground : float, s m-1
+        Resistance of the lower half of the lowest cell.
+    heat_capacity : float, J m-3 K-1, optional
+        Of the air, which turns fluxes of heat into fluxes of temperature; None for held ground.
+    is_flux : bool
+        True when the ground gives a flux, so that its number is not a temperature.
     widths : (nz,) float64, m
         Heights of the cells.
     """
 
     generator: np.ndarray
-    ground_source: float
     top_source: float
-    skin_air: float
-    skin_ground: float
+    to_ground: float
+    heat_capacity: float | None
+    is_flux: bool
     widths: np.ndarray
 
     @classmethod
@@ -72,7 +78,7 @@ class VerticalDiffusion:
         cls,
         grid: Grid,
         diffusivity: Diffusivity,
-        ground: HeldGround | FluxGround | ExchangeGround,
+        ground: GroundBoundary,
         top: Top,
     ) -> VerticalDiffusion:
         """Assemble the matrix for a grid, a diffusivity and two boundaries."""
@@ -87,38 +93,49 @@ class VerticalDiffusion:
         matrix[lower, upper] = between / widths[:-1]
         matrix[upper, lower] = between / widths[1:]
 
-        match ground:
-            case HeldGround():
-                conductance, source = 1.0 / to_ground, 1.0 / (to_ground * widths[0])
-                skin_air, skin_ground = 0.0, 1.0
-            case FluxGround():
-                conductance, source = 0.0, 1.0 / (ground.heat_capacity * widths[0])
-                skin_air, skin_ground = 1.0, to_ground / ground.heat_capacity
-            case ExchangeGround():
-                # the exchange and the half cell of air resist one after the other
-                exchange = ground.heat_capacity / ground.coefficient
-                conductance = 1.0 / (exchange + to_ground)
-                source = conductance / widths[0]
-                skin_air = exchange * conductance
-                skin_ground = to_ground * conductance
-        matrix[0, 0] -= conductance / widths[0]
         top_source = 1.0 / (to_top * widths[-1]) if top.kind == "held" else 0.0
         matrix[-1, -1] -= top_source
         off_diagonal = matrix.sum(axis=1) - np.diag(matrix)
         matrix[np.diag_indices(levels)] -= off_diagonal
-        return cls(matrix, float(source), top_source, skin_air, skin_ground, widths)
+        heat_capacity = None if isinstance(ground, HeldGround) else ground.heat_capacity
+        return cls(matrix, top_source, to_ground, heat_capacity, isinstance(ground, FluxGround), widths)
 
-    @property
-    def is_flux(self) -> bool:
-        """True when the ground gives a flux, so that its number is not a temperature."""
-        return self.skin_air == 1.0
+    def conductance(self, coefficient: np.ndarray) -> np.ndarray:
+        """Conductance from the ground to the lowest cell [m s-1] for coefficients of exchange [W m-2 K-1].
 
-    def step(self, time_step: float) -> np.ndarray:
+        The exchange and the half cell of air resist one after the other.
+        """
+        assert self.heat_capacity is not None
+        return np.asarray(coefficient / (self.heat_capacity + coefficient * self.to_ground))
+
+    def skin(
+        self, lowest: np.ndarray, ground: np.ndarray, conductance: float | np.ndarray = 0.0
+    ) -> np.ndarray:
+        """Temperature of the air's skin [K] between the lowest cells and the ground's numbers."""
+        if self.is_flux:
+            assert self.heat_capacity is not None
+            return np.asarray(lowest + self.to_ground / self.heat_capacity * ground)
+        if self.heat_capacity is None:
+            return ground.copy()
+        share = conductance * self.to_ground
+        return np.asarray((1.0 - share) * lowest + share * ground)
+
+    def steps(
+        self, time_step: float, conductances: Sequence[float]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`step` and `reach` for several conductances, stacked along a first axis."""
+        matrices = [self.step(time_step, conductance) for conductance in conductances]
+        begins, ends = zip(*map(self.reach, matrices), strict=True)
+        return np.stack(matrices), np.stack(begins), np.stack(ends)
+
+    def step(self, time_step: float, conductance: float) -> np.ndarray:
         """The matrix that advances all columns by `time_step` [s].
 
         Parameters
         ----------
         time_step : float, s
+        conductance : float, m s-1
+            Between the ground and the lowest cell; zero for insulated ground and for a flux.
 
         Returns
         -------
@@ -129,10 +146,15 @@ class VerticalDiffusion:
             walls'. With insulated walls and with a flux, heat is conserved to round-off.
         """
         levels = self.widths.size
+        ground_source = conductance / self.widths[0]
+        if self.is_flux:
+            assert self.heat_capacity is not None
+            ground_source = 1.0 / (self.heat_capacity * self.widths[0])
         system = np.zeros((levels + BOUNDARY_ROWS, levels + BOUNDARY_ROWS))
         system[:levels, :levels] = self.generator
+        system[0, 0] -= conductance / self.widths[0]
         start, slope, top = levels, levels + 1, levels + 2
-        system[0, start] = self.ground_source
+        system[0, start] = ground_source
         system[-1 - BOUNDARY_ROWS, top] = self.top_source
         system[start, slope] = 1.0 / time_step
         norm = float(np.max(np.sum(np.abs(system), axis=1))) * time_step
@@ -145,12 +167,12 @@ class VerticalDiffusion:
         term = np.eye(len(system))
         result = term.copy()
         for number in range(1, TERMS + 1):
-            term = term @ positive / number
+            term = _product(positive, term) / number
             result += term
         result *= math.exp(-rate * short)
         self._restore(result)
         for _ in range(squarings):
-            result = result @ result
+            result = _product(result, result)
             self._restore(result)
 
         inner = result[:levels, :levels]
@@ -160,7 +182,7 @@ class VerticalDiffusion:
         if self.is_flux:
             # all that flows in must arrive: exactly the flux times the time
             arrived = self.widths @ matrix[:, [start, slope]]
-            matrix[:, [start, slope]] *= time_step * self.ground_source * self.widths[0] / arrived * [1, 0.5]
+            matrix[:, [start, slope]] *= time_step * ground_source * self.widths[0] / arrived * [1, 0.5]
         # from (value at the start, change) to (value at the start, value at the end)
         matrix[:, start] = np.maximum(matrix[:, start] - matrix[:, slope], 0.0)
         return matrix
@@ -189,3 +211,14 @@ class VerticalDiffusion:
             total += result[:levels, levels]
         diagonal = np.diag_indices(levels)
         inner[diagonal] = np.maximum(inner[diagonal] + (1.0 - total), 0.0)
+
+
+def _product(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Product of two square matrices that skips the zeros beside the band of the left one.
+
+    Not by a linear algebra library: its threads, which wait for each other over so small a product, take a
+    hundred times as long on a busy machine.
+    """
+    result = np.empty_like(right)
+    spread_columns(left, *VerticalDiffusion.reach(left), right, result, 0, len(right))
+    return result
