@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -99,6 +100,8 @@ def _encoding(first: xr.Dataset, **options: Any) -> dict[str, dict[str, Any]]:
 
 
 def _write_zarr(folder: Path, first: xr.Dataset, later: Iterator[xr.Dataset]) -> None:
+    import zarr
+
     encoding = _encoding(first)
     for name, variable in first.variables.items():
         # One chunk per instant for volumes, many instants per chunk for short things such as time itself.
@@ -112,6 +115,10 @@ def _write_zarr(folder: Path, first: xr.Dataset, later: Iterator[xr.Dataset]) ->
         _later(first, instant).drop_encoding().to_zarr(
             folder, mode="a", append_dim="time", consolidated=False
         )
+    with warnings.catch_warnings():
+        # Zarr says that its third format has not settled this yet; xarray warns where it is missing.
+        warnings.filterwarnings("ignore", "Consolidated metadata", category=UserWarning)
+        zarr.consolidate_metadata(folder)
 
 
 def _write_netcdf(file: Path, first: xr.Dataset, later: Iterator[xr.Dataset], target: Path) -> None:
