@@ -223,7 +223,7 @@ def test_missing_and_broken_images_are_refused(tmp_path):
         (HeldGround, {"temperature": -5}, "kelvin"),
         (HeldGround, {"temperature": {"daily": {"mean": 10, "amplitude": 20}}}, "reaches -10"),
         (ExchangeGround, {"coefficient": 10, "temperature": 0}, "kelvin"),
-        (ExchangeGround, {"coefficient": -1, "temperature": 300}, "coefficient: it is zero or positive"),
+        (ExchangeGround, {"coefficient": -1, "temperature": 300}, "coefficient: must not be negative"),
         (
             ExchangeGround,
             {"coefficient": {"daily": {"mean": 5, "amplitude": 6}}, "temperature": 300},

@@ -24,7 +24,7 @@ def _is_kelvin(name: str, quantity: Quantity) -> None:
 def _is_not_negative(name: str, quantity: Quantity) -> None:
     lowest = quantity.bounds()[0]
     if lowest < 0:
-        raise ValueError(f"{name}: it is zero or positive everywhere and always, but may reach {lowest:g}")
+        raise ValueError(f"{name}: must not be negative at any place or time, but may reach {lowest:g}")
 
 
 @final
