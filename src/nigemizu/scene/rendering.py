@@ -6,6 +6,8 @@ import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, final
 
+import numpy as np
+
 from nigemizu.errors import NigemizuWarning
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.scene.picture import RenderedPicture
@@ -18,6 +20,9 @@ __all__ = ["Studio", "render", "warn_of_lost_rays"]
 
 # Up to a row of pixels at the horizon is nothing to warn of: over flat ground its light runs level for ever.
 _SEEN_SHARE: Final = 5e-3
+# Steps that a ray needs while it is turned back, and the share of the mirage's height that may lack them.
+_TURN_STEPS: Final = 4
+_RAGGED_SHARE: Final = 0.2
 
 
 @final
@@ -75,9 +80,37 @@ def render(
     scene.check()
     studio = Studio(scene, variant)
     volume = None if scene.tracer.method == "straight" else air_at(scene, time, air, progress)
+    if volume is not None and scene.tracer.method == "bent":
+        warn_of_long_steps(volume, scene)
     picture = studio.shoot(volume, progress=progress)
     warn_of_lost_rays(picture.statuses, scene)
     return picture
+
+
+def warn_of_long_steps(air: AirVolume, scene: Scene) -> None:
+    """Warn when much of the light that the air turns back would be turned within a few steps.
+
+    A ray that arrives at the angle θ = √(2 Δn) and turns where the gradient is g does so over the length
+    2 θ / g. With fewer than some four steps along it, neighbouring rays turn differently: noise.
+    """
+    below = air.z <= scene.camera.eye[2]
+    height, index = air.z[below], air.refractivity.mean(axis=(1, 2))[below]
+    if height.size < 2:
+        return
+    gradient = np.diff(index) / np.diff(height)
+    angle = np.sqrt(2.0 * (index.max() - index))
+    length = np.divide(
+        angle[1:] + angle[:-1], gradient, out=np.full_like(gradient, np.inf), where=gradient > 0.0
+    )
+    ragged = length < _TURN_STEPS * scene.tracer.step
+    if np.sum((angle[:-1] - angle[1:])[ragged]) > _RAGGED_SHARE * angle.max():
+        shortest = float(length[ragged].min())
+        warnings.warn(
+            f"the air turns light back within {shortest:.2g} m, which a step of {scene.tracer.step:g} m "
+            f"makes ragged; set tracer.step to {shortest / _TURN_STEPS / 2:.1g} or less",
+            NigemizuWarning,
+            stacklevel=4,
+        )
 
 
 def warn_of_lost_rays(statuses: Mapping[str, int], scene: Scene) -> None:
