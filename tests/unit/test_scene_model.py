@@ -149,3 +149,8 @@ def test_stored_instants_end_at_the_end(
     duration: float, every: float | None, stored: tuple[float, ...]
 ) -> None:
     assert TimeSpec(duration=duration, store_every=every).stored == pytest.approx(stored)
+
+
+def test_more_instants_than_anyone_stores_are_refused_before_they_are_listed() -> None:
+    with pytest.raises(InputError, match=r"time\.store_every: more than 1000000 instants"):
+        _ = TimeSpec(duration=1e9, store_every=1.0).stored

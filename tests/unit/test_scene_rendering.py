@@ -20,7 +20,7 @@ def layer(gradient: float, thickness: float = 0.01) -> AirVolume:
     return AirVolume(np.zeros(1), np.zeros(1), height, np.tile(index[:, None, None], (1, 2, 3)))
 
 
-# In a linear layer rays are parabolas, turned over 2 θ / g: 4.5 m for half the largest angle, √(2 · 1e-3 · 0.01).
+# In a linear layer rays are parabolas, turned over 2 θ / g: 4.5 m at half the largest angle, √(2 · 1e-5).
 @pytest.mark.parametrize(("step", "ragged"), [(4.0, True), (2.0, True), (1.0, False), (0.5, False)])
 def test_steps_too_long_for_steep_air(step: float, ragged: bool) -> None:
     scene = Scene.load("pyramid", {"tracer.step": step})

@@ -160,5 +160,9 @@ def require_within(dataset: xarray.Dataset, times: tuple[float, ...]) -> None:
     for time in (min(times), max(times)):
         if not first <= time <= last:
             raise InputError(
-                "the dataset does not cover it", key="time", value=time, expected=f"{first:g} s to {last:g} s"
+                "the dataset does not cover it",
+                key="time",
+                value=time,
+                expected=f"{first:g} s to {last:g} s",
+                remedy="name an instant in it, with --time or film.start",
             )

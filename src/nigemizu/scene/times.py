@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, final
+from typing import Annotated, Final, final
 
 from pydantic import Field
 
+from nigemizu.errors import InputError
 from nigemizu.values import Value
 
 __all__ = ["FilmSpec", "TimeSpec"]
+
+_MOST_INSTANTS: Final = 1_000_000
 
 
 @final
@@ -43,6 +46,13 @@ class TimeSpec(Value):
         every = self.store_every or self.duration / 10.0
         if every <= 0.0:
             return (0.0,)
+        if self.duration / every > _MOST_INSTANTS:
+            raise InputError(
+                f"more than {_MOST_INSTANTS} instants in {self.duration:g} s",
+                key="time.store_every",
+                value=every,
+                remedy="store fewer instants",
+            )
         inner = [index * every for index in range(int(self.duration / every * (1 + 1e-12)) + 1)]
         if self.duration - inner[-1] > 1e-9 * self.duration:
             inner.append(self.duration)
