@@ -125,7 +125,8 @@ def integrator_class(variant: str) -> Any:
             while dr.hint(active, label="nigemizu"):
                 # ---------------------- follow the bent segment ----------------------
                 ray, s, status = self.bending.advance(scene, ray, active)
-                si = scene.ray_intersect(ray, mi.RayFlags.All, True, active)
+                # not "coherent", see `surface_query`
+                si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
                 s += dr.select(si.is_valid(), si.t, 0)
                 # Leaving the air is not the end: what lies behind it may still be met.
                 ended = dr.select(
