@@ -154,3 +154,9 @@ def test_stored_instants_end_at_the_end(
 def test_more_instants_than_anyone_stores_are_refused_before_they_are_listed() -> None:
     with pytest.raises(InputError, match=r"time\.store_every: more than 1000000 instants"):
         _ = TimeSpec(duration=1e9, store_every=1.0).stored
+
+
+def test_instants_larger_than_the_memory_are_refused_before_the_first() -> None:
+    scene = Scene.load("pyramid", {"time.duration": 1e6, "time.store_every": 1.0})
+    with pytest.raises(InputError, match=r"times: 1000001 instants need 6193\.2 GB.*save_air"):
+        scene.simulate()

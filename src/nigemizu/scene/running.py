@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from nigemizu.errors import InputError
 from nigemizu.progress import ProgressMeter
+from nigemizu.scene.memory import memory_available
 
 if TYPE_CHECKING:
     import xarray
@@ -62,6 +63,7 @@ def simulate(scene: Scene, times: tuple[float, ...], progress: ProgressMeter) ->
 
     scene.check()
     _require_times(times, scene)
+    _require_memory(scene, len(times))
     states = _states(scene, times, progress)
     dataset = to_dataset(scene.grid.build(), states, title=scene.title, scene=scene.to_toml())
     return complete(dataset, scene.air)
@@ -150,6 +152,17 @@ def _require_times(times: tuple[float, ...], scene: Scene) -> None:
         raise InputError("no instant was asked for", key="times")
     if not all(np.isfinite(time) and time >= 0.0 for time in times):
         raise InputError("lies before the beginning", key="time", value=min(times), expected="seconds ≥ 0")
+
+
+def _require_memory(scene: Scene, instants: int) -> None:
+    """Refuse, before the first, instants that cannot be held: a temperature and an index in each cell."""
+    needed, at_hand = instants * int(np.prod(scene.grid.cells, dtype=object)) * 16, memory_available()
+    if at_hand is not None and needed > at_hand:
+        raise InputError(
+            f"{instants} instants need {needed / 1e9:.1f} GB of memory, {at_hand / 1e9:.1f} GB are available",
+            key="times",
+            remedy="keep fewer, or write them one by one with save_air (nigemizu simulate)",
+        )
 
 
 def require_within(dataset: xarray.Dataset, times: tuple[float, ...]) -> None:
