@@ -204,8 +204,8 @@ def test_short_chords_meet_a_far_car():
     """Rationale: chords begin close to what they meet; packets of such rays must not lose flat parts.
 
     Expected: seen from 0.8 m behind, the rear of a car 760 m from the origin is met by every ray, at its
-    body (x = 757.8), at what stands out from it, or where it is rounded (x < 758.4). Handed to Embree as coherent
-    packets, a third of these rays went through.
+    body (x = 757.8), at what stands out from it, or where it is rounded (x < 758.4). Handed to Embree as
+    coherent packets, a third of these rays went through.
     """
     car = render.Vehicle(position=(760.0, 1.9, 0.0), heading=0.0)
     scene = render.build(render.Camera(), render.Light(), [car], integrator=render.integrator())
