@@ -189,3 +189,13 @@ def test_errors_name_the_file(tmp_path):
 def test_values_stay_in_the_file_until_used(tmp_path):
     plain(np.full((2, 3), 300.0), time=[0.0, 1.0], z=Z).to_netcdf(tmp_path / "air.nc", engine="netcdf4")
     assert not read_air(tmp_path / "air.nc")["air_temperature"]._in_memory
+
+
+@pytest.mark.parametrize("suffix", ["nc", "zarr"])
+def test_an_instant_larger_than_memory_is_refused_before_it_is_read(tmp_path, suffix):
+    path = tmp_path / f"air.{suffix}"
+    foreign().to_netcdf(path) if suffix == "nc" else foreign().to_zarr(path, consolidated=False)
+    # 36 values an instant, in four copies of 8 bytes
+    assert read_air(path, available=lambda: 36 * 32)["air_temperature"].size == 72
+    with pytest.raises(InputError, match=r"T: one instant of 36 values needs .* cut out or coarsen"):
+        read_air(path, available=lambda: 36 * 32 - 1)

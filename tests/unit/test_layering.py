@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "src" / "nigemizu"
 
-SHARED = {"errors", "progress", "units", "values"}
+SHARED = {"errors", "memory", "progress", "units", "values"}
 """Modules that every room may import."""
 
 ROOMS: dict[str, set[str]] = {

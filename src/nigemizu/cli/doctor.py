@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from nigemizu.errors import MachineError
+from nigemizu.memory import available_memory
 
 __all__ = ["demand_backend", "examine", "find_backends", "import_compiler", "report"]
 
@@ -46,8 +47,6 @@ def examine() -> dict[str, Any]:
         JSON-ready; ``can_render`` says whether pictures can be made here, ``remedy`` what to do if not.
     """
     version, cuda = find_backends()
-    from nigemizu.scene.memory import memory_available  # imports what find_backends has made silent
-
     state = _llvm_state(version)
     can_render = state == "found" or cuda
     return {
@@ -64,7 +63,7 @@ def examine() -> dict[str, Any]:
         "cuda": cuda,
         "processor": _processor(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "memory_available": memory_available(),
+        "memory_available": available_memory(),
         "disk_free": shutil.disk_usage(os.getcwd()).free,
         "can_render": can_render,
         "remedy": None if state == "found" else _remedy(state),

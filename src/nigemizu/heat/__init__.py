@@ -19,7 +19,7 @@ if TYPE_CHECKING:
         Top,
     )
     from nigemizu.heat.dataset import complete, mean_temperature_at, read_air, refractivity_at, to_dataset
-    from nigemizu.heat.grid import Grid, GridSpec, available_memory, require_memory
+    from nigemizu.heat.grid import Grid, GridSpec, require_memory
     from nigemizu.heat.initial import Initial, ProfileTable, Unevenness
     from nigemizu.heat.quantity import (
         Daily,
@@ -59,7 +59,6 @@ __all__ = [
     "Top",
     "Unevenness",
     "Wind",
-    "available_memory",
     "complete",
     "evolve",
     "mean_temperature_at",
@@ -74,7 +73,7 @@ _HOMES: Final = {
     "boundary": ("ExchangeGround", "FluxGround", "GroundBoundary", "HeldGround", "Sides", "Top"),
     "dataset": ("complete", "mean_temperature_at", "read_air", "refractivity_at", "to_dataset"),
     "solver": ("State", "evolve", "solve"),
-    "grid": ("Grid", "GridSpec", "available_memory", "require_memory"),
+    "grid": ("Grid", "GridSpec", "require_memory"),
     "initial": ("Initial", "ProfileTable", "Unevenness"),
     "quantity": (
         "Daily",

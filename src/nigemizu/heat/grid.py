@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Annotated, Final, Self, final
 
 import numpy as np
@@ -14,9 +13,10 @@ from pydantic import Field, model_validator
 
 from nigemizu.errors import InputError
 from nigemizu.heat.measures import Metres
+from nigemizu.memory import available_memory
 from nigemizu.values import Value
 
-__all__ = ["Grid", "GridSpec", "available_memory", "require_memory"]
+__all__ = ["Grid", "GridSpec", "require_memory"]
 
 LARGEST_STRETCH: Final = 1.5
 """Neighbouring cells differ in height by at most this ratio; beyond it the second order is lost."""
@@ -207,17 +207,6 @@ def _geometric_sum(ratio: float, terms: int) -> float:
     if ratio == 1.0:
         return float(terms)
     return math.expm1(terms * math.log(ratio)) / (ratio - 1.0)
-
-
-def available_memory() -> int | None:
-    """Bytes of memory that can be taken without swapping; None where the system does not tell."""
-    meminfo = Path("/proc/meminfo")
-    if not meminfo.exists():
-        return None
-    for line in meminfo.read_text(encoding="ascii").splitlines():
-        if line.startswith("MemAvailable:"):
-            return int(line.split()[1]) * 1024
-    return None
 
 
 def require_memory(

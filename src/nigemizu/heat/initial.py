@@ -12,8 +12,9 @@ from pydantic import Field, model_validator
 
 from nigemizu.errors import InputError
 from nigemizu.heat.formula import check_formula, evaluate_formula
-from nigemizu.heat.grid import Grid, available_memory, require_memory
+from nigemizu.heat.grid import Grid, require_memory
 from nigemizu.heat.measures import Kelvin, KelvinDifference, Metres, Seconds
+from nigemizu.memory import available_memory
 from nigemizu.values import Value
 
 __all__ = ["Initial", "ProfileTable", "Unevenness"]

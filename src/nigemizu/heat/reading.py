@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from nigemizu.errors import InputError
+from nigemizu.memory import available_memory
 
 __all__ = ["read_air"]
 
@@ -68,10 +69,13 @@ _AXIS_NAMES: Final = {
     "z": ("z", "height", "altitude", "height_above_mean_sea_level", "height_above_reference_ellipsoid"),
     "time": ("time", "t"),
 }
+_COPIES: Final = 4
 _DEGREES: Final = ("latitude", "longitude", "lat", "lon", "grid_latitude", "grid_longitude")
 
 
-def read_air(source: str | Path | xr.Dataset) -> xr.Dataset:
+def read_air(
+    source: str | Path | xr.Dataset, *, available: Callable[[], int | None] = available_memory
+) -> xr.Dataset:
     """Read air from a Zarr store or netCDF file, in SI on the axes time, z, y, x.
 
     Parameters
@@ -81,6 +85,8 @@ def read_air(source: str | Path | xr.Dataset) -> xr.Dataset:
         ``air_refractivity``, on any of (time, z, y, x), at least z; optionally ``surface_temperature``,
         ``air_pressure`` and ``relative_humidity``. Axes are recognised by the CF attributes ``axis`` and
         ``standard_name`` or by the names x, y, z, height, altitude, time, t.
+    available : callable
+        Tells the bytes of memory at hand, or None if unknown (then nothing is refused for its size).
 
     Returns
     -------
@@ -93,7 +99,8 @@ def read_air(source: str | Path | xr.Dataset) -> xr.Dataset:
     ------
     InputError
         The file is missing or is no dataset; no such variable (the nearest is named); NaN (where, and
-        how many); an axis that does not increase; units of the wrong kind; values that no air has.
+        how many); an axis that does not increase; units of the wrong kind; values that no air has; a single
+        instant that does not fit the memory.
 
     Notes
     -----
@@ -105,6 +112,8 @@ def read_air(source: str | Path | xr.Dataset) -> xr.Dataset:
     renamed: dict[str, xr.DataArray] = {}
     for variable, original in found.items():
         array = _with_axes(dataset[original], name)
+        if name is not None:
+            _require_memory(array, name, available)
         units, low, high = _VARIABLES[variable]
         array = _converted(array.rename(variable), units, variable, name)
         _check_values(array, variable, low, high, name)
@@ -124,6 +133,20 @@ def read_air(source: str | Path | xr.Dataset) -> xr.Dataset:
             expected="the same x, y, z and time for all",
         ) from error
     return result.assign_attrs(dataset.attrs)
+
+
+def _require_memory(array: xr.DataArray, file: str, available: Callable[[], int | None]) -> None:
+    """Refuse an instant that cannot be held: as it is read, in double precision, and as an index."""
+    values = array.size // max(array.sizes.get("time", 1), 1)
+    need, have = _COPIES * 8 * values, available()
+    if have is not None and need > have:
+        raise InputError(
+            f"one instant of {values:,} values needs {need / 2**30:.2f} GiB of memory, "
+            f"and {have / 2**30:.2f} GiB are available",
+            file=file,
+            key=str(array.name),
+            remedy="cut out or coarsen the part that light crosses",
+        )
 
 
 def _open(path: Path) -> xr.Dataset:

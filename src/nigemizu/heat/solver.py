@@ -11,9 +11,10 @@ import numpy as np
 
 from nigemizu.errors import InputError
 from nigemizu.heat.boundary import ExchangeGround, GroundBoundary, Sides, Top
-from nigemizu.heat.grid import Grid, available_memory, require_memory
+from nigemizu.heat.grid import Grid, require_memory
 from nigemizu.heat.stepping import State, Stepper, ground_quantity
 from nigemizu.heat.transport import Diffusivity, Wind
+from nigemizu.memory import available_memory
 from nigemizu.progress import SILENT, ProgressMeter
 
 if TYPE_CHECKING:

@@ -17,9 +17,9 @@ from nigemizu.heat.boundary import GroundBoundary, Sides, Top
 from nigemizu.heat.grid import GridSpec
 from nigemizu.heat.initial import Initial
 from nigemizu.heat.transport import Diffusivity, Wind
+from nigemizu.memory import available_memory
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.render import Camera, Light, Object
-from nigemizu.scene.memory import memory_available
 from nigemizu.scene.reading import apply_overrides, parse_toml, read_text, validate
 from nigemizu.scene.times import FilmSpec, TimeSpec
 from nigemizu.scene.writing import to_toml
@@ -161,7 +161,7 @@ class Scene(Value):
 
         return schema(cls)
 
-    def check(self, *, available: Callable[[], int | None] = memory_available) -> None:
+    def check(self, *, available: Callable[[], int | None] = available_memory) -> None:
         """Look for what cannot work although each value is valid by itself.
 
         Parameters

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nigemizu.errors import InputError
+from nigemizu.memory import available_memory
 from nigemizu.progress import ProgressMeter
-from nigemizu.scene.memory import memory_available
 
 if TYPE_CHECKING:
     import xarray
@@ -156,7 +156,7 @@ def _require_times(times: tuple[float, ...], scene: Scene) -> None:
 
 def _require_memory(scene: Scene, instants: int) -> None:
     """Refuse, before the first, instants that cannot be held: a temperature and an index in each cell."""
-    needed, at_hand = instants * int(np.prod(scene.grid.cells, dtype=object)) * 16, memory_available()
+    needed, at_hand = instants * int(np.prod(scene.grid.cells, dtype=object)) * 16, available_memory()
     if at_hand is not None and needed > at_hand:
         raise InputError(
             f"{instants} instants need {needed / 1e9:.1f} GB of memory, {at_hand / 1e9:.1f} GB are available",

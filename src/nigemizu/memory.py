@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["memory_available"]
+__all__ = ["available_memory"]
 
 _CGROUP = Path("/sys/fs/cgroup")
 
 
-def memory_available() -> int | None:
+def available_memory() -> int | None:
     """Bytes that this process may still take, or None where the system does not say.
 
     Limits: on Linux the smaller of what the kernel calls available and what the control group still allows;
