@@ -104,6 +104,15 @@ def test_animate_writes_a_film_and_its_frames(run: Run, small: tuple[str, ...]) 
     assert len(list(Path("film_frames").glob("*.png"))) == 3
 
 
+@pytest.mark.parametrize("verb", ["render", "animate"])
+def test_steps_too_long_for_the_air_are_told_once(run: Run, small: tuple[str, ...], verb: str) -> None:
+    name = "film.mp4" if verb == "animate" else "picture.png"
+    done = run(verb, "road", "-o", name, "--set=tracer.step=50", "--set=film.frames=2", *small)
+    assert (done.code, done.out) == (0, f"{name}\n")
+    assert done.err.startswith("nigemizu: warning: the air turns light back within ")
+    assert len(done.err.splitlines()) == 1
+
+
 def test_frames_are_the_same_whoever_renders_them(run: Run, small: tuple[str, ...]) -> None:
     run("animate", "road", "-o", "one.mp4", "--frames", "3", *small)
     done = run("animate", "road", "-o", "two.mp4", "--frames", "3", "--workers", "2", *small)

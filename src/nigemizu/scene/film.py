@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from nigemizu.errors import MachineError
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.scene.digest import air_digest
-from nigemizu.scene.rendering import Studio, warn_of_lost_rays
+from nigemizu.scene.rendering import Studio, warn_of_long_steps, warn_of_lost_rays
 from nigemizu.scene.running import AirSource, AirVolume, Variant, air_instants, open_air, require_within
 
 if TYPE_CHECKING:
@@ -101,6 +101,8 @@ def _jobs(scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSou
     wanted = frozenset(missing)
     times = scene.film.times[: missing[-1] + 1]
     for index, volume in enumerate(air_instants(scene, times, air, SILENT)):
+        if index == missing[0] and scene.tracer.method == "bent":
+            warn_of_long_steps(volume, scene)
         if index in wanted:
             yield index, volume, folder.frame(index)
 
