@@ -10,15 +10,31 @@ downwind of a face's donor, `f` the value carried through the face.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numba import njit
 
 __all__ = ["move_levels", "spread_columns", "spread_groups"]
 
+
+def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile without the interpreter's lock, and keep the machine code for the next process."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        try:
+            return njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+        except RuntimeError:  # neither beside this file nor in a home is there a folder to keep it in
+            return njit(nogil=True, error_model="numpy", **options)(function)
+
+    return decorate
+
+
 PAD = 3  # cells of padding on each side: the donor before the first cell, and two more
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_compiled()
 def _beyond(index, count, periodic, reflecting):  # type: ignore[no-untyped-def]
     """The cell that stands for `index` outside 0..count-1: wrapped, mirrored, or the outermost one."""
     if periodic:
@@ -29,7 +45,7 @@ def _beyond(index, count, periodic, reflecting):  # type: ignore[no-untyped-def]
     return min(max(index, 0), count - 1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_compiled()
 def _fill(source, padded, pad, shift, periodic, reflecting):  # type: ignore[no-untyped-def]
     """Copy a row, moved by `shift` cells, with `pad` cells of what lies beyond on each side."""
     count = source.size
@@ -43,7 +59,7 @@ def _fill(source, padded, pad, shift, periodic, reflecting):  # type: ignore[no-
         padded[m] = source[_beyond(m - pad - shift, count, periodic, reflecting)]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_compiled()
 def _face_flux(a, b, C, d, e, w, c, flux):  # type: ignore[no-untyped-def]
     """What leaves the donor cells `C` through their downwind face; `a`, `b` lie upwind, `d`, `e` downwind.
 
@@ -62,7 +78,7 @@ def _face_flux(a, b, C, d, e, w, c, flux):  # type: ignore[no-untyped-def]
         flux[i] = c * (centre + min(highest, max(lowest, high)))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_compiled()
 def _carry_x(source, target, shift, c, w, periodic, row, flux):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(ny):
@@ -80,7 +96,7 @@ def _carry_x(source, target, shift, c, w, periodic, row, flux):  # type: ignore[
                 out[i] = row[i + PAD] - (flux[i + 1] - flux[i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_compiled()
 def _carry_y(source, target, shift, c, w, periodic, before, after):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(-1, ny):
@@ -107,7 +123,7 @@ def _carry_y(source, target, shift, c, w, periodic, before, after):  # type: ign
         before, after = after, before
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_compiled()
 def _spread_x(source, target, half, weights, periodic, row):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(ny):
@@ -121,7 +137,7 @@ def _spread_x(source, target, half, weights, periodic, row):  # type: ignore[no-
                 out[i] += weight * (left[i] + right[i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_compiled()
 def _spread_y(source, target, half, weights, periodic):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(ny):
@@ -136,7 +152,7 @@ def _spread_y(source, target, half, weights, periodic):  # type: ignore[no-untyp
                 out[i] += weight * (left[i] + right[i])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@_compiled()
 def move_levels(  # type: ignore[no-untyped-def]
     air, first, stride, y_first, shifts, parts, carry_weights, halves, spread_weights, periodic
 ):
@@ -226,7 +242,7 @@ def _multiply_row(row, begin, end, levels, block, line, count):  # type: ignore[
             k += 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@_compiled(fastmath={"contract"})
 def spread_columns(matrix, begins, ends, air, result, first, last):  # type: ignore[no-untyped-def]
     """Multiply the columns ``first … last - 1`` of `air` by `matrix`.
 
@@ -257,7 +273,7 @@ def spread_columns(matrix, begins, ends, air, result, first, last):  # type: ign
                 result[i, corner + m] = line[m]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@_compiled(fastmath={"contract"})
 def spread_groups(  # type: ignore[no-untyped-def]
     matrices, begins, ends, firsts, columns, weights, air, result, first, last
 ):
