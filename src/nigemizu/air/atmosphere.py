@@ -35,6 +35,8 @@ class Atmosphere(Value):
     wavelength : float, m
         Vacuum wavelength whose index bends the rays.
     model : {"ciddor1996", "lehn1978", "gladstone-dale", "edlen-nist"}
+        Law of refraction: Ciddor (1996); n − 1 proportional to the density, as Lehn and El-Arini (1978) have
+        it or with a constant of your own; Edlén's equation as NIST modified it.
     gladstone_dale_constant : float, m³ kg⁻¹, optional
         Needed by, and only by, the model ``"gladstone-dale"``.
 
