@@ -53,13 +53,14 @@ def wall(distance: float) -> trace.Surface:
 SCENE = trace.combine(wall(500.0), trace.ground_plane(0.0))
 
 
-def test_heights_at_the_wall_and_ground_hits() -> None:
+@pytest.mark.parametrize(("stepper", "height_error"), [(trace.LEAPFROG, 1e-7), (trace.SUZUKI4, 1e-8)])
+def test_heights_at_the_wall_and_ground_hits(stepper: trace.Stepper, height_error: float) -> None:
     air = field.ExponentialTemperature(TYPES)
     angles = [*HEIGHT_AT_500_M, *GROUND_HIT_M]
-    end = trace.march(air, *launch(TYPES, angles), step=0.1, max_steps=10_000, surface=SCENE)
+    end = trace.march(air, *launch(TYPES, angles), step=0.1, max_steps=10_000, stepper=stepper, surface=SCENE)
     assert np.all(np.array(end.status) == trace.HIT)
     heights, distances = np.array(end.position.z), np.array(end.position.x)
-    assert np.allclose(heights[:5], list(HEIGHT_AT_500_M.values()), rtol=0, atol=1e-6)
+    assert np.allclose(heights[:5], list(HEIGHT_AT_500_M.values()), rtol=0, atol=height_error)
     assert np.allclose(distances[5:], list(GROUND_HIT_M.values()), rtol=0, atol=1e-3)
     assert np.max(np.abs(heights[5:])) < 1e-12
 
