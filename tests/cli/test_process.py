@@ -16,6 +16,9 @@ Program = Callable[..., "subprocess.Popen[str]"]
 HEAVY = ("mitsuba", "drjit", "xarray", "numba", "scipy", "matplotlib", "pydantic")
 
 
+FRAMES = 16  # enough that a busy machine cannot end the film before Ctrl-C arrives
+
+
 def _shortest(command: list[str]) -> float:
     taken = []
     for _ in range(5):
@@ -71,13 +74,13 @@ def test_interrupted_film_goes_on_where_it_stopped(
 ) -> None:
     folder = tmp_path / "there"
     frames = folder / "film_frames"
-    command = ["animate", "road", "--frames", "8", *small, "--size", "64x36", "--spp", "16"]
+    command = ["animate", "road", "--frames", str(FRAMES), *small, "--size", "64x36", "--spp", "16"]
     process = program(*command, "-o", "film.mp4", "--workers", workers)
     out, err = _interrupt(process, lambda: len(list(frames.glob("[0-9]*.png"))) >= 2)
-    assert process.returncode == 130
+    assert process.returncode == 130, err
     assert (out, err) == ("", "nigemizu: interrupted\n")
     done = {file.name: file.stat().st_mtime_ns for file in frames.glob("[0-9]*.png")}
-    assert 2 <= len(done) < 8
+    assert 2 <= len(done) < FRAMES
     assert {entry.name for entry in folder.iterdir()} == {"film_frames"}
 
     for name in ("film.mp4", "whole.mp4"):
@@ -87,7 +90,7 @@ def test_interrupted_film_goes_on_where_it_stopped(
     kept = {name: (frames / name).stat().st_mtime_ns for name in done}
     assert kept == done
     whole = sorted((folder / "whole_frames").glob("[0-9]*.png"))
-    assert len(whole) == 8
+    assert len(whole) == FRAMES
     for file in whole:
         assert file.read_bytes() == (frames / file.name).read_bytes()
 

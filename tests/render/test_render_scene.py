@@ -1,5 +1,9 @@
 """Pictures of described scenes: the horizon, haze, haste, and what a picture reports."""
 
+import os
+import signal
+import time
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -224,3 +228,14 @@ def test_short_chords_meet_a_far_car():
     )
     assert np.all(np.array(hit))
     assert 0.5 < np.array(distance).min() < np.array(distance).max() < 1.4
+
+
+def test_ctrl_c_between_pictures_is_seen():
+    """Mitsuba leaves its own handler behind, which drops the first Ctrl-C after a rendering."""
+    scene = render.build(
+        render.Camera(width=4, height=4), render.Light(), [render.Ground()], integrator=render.integrator()
+    )
+    render.picture(scene, samples=1)
+    with pytest.raises(KeyboardInterrupt):  # noqa: PT012  (the signal arrives a moment later)
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1.0)

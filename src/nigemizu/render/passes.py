@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
 from dataclasses import dataclass
 from typing import Any, Final, final
@@ -88,6 +90,7 @@ def picture(
             # Opaque: a number known to the compiler would be compiled in, again for every pass.
             opaque = dr.opaque(mi.UInt32, int(state))
             image = integrator.render(scene, sensor, seed=opaque, spp=count)
+            _take_interrupts_back()
             if integrator.should_stop():  # Mitsuba keeps Ctrl-C to itself while it renders
                 raise KeyboardInterrupt
             total += np.asarray(image, dtype=np.float64)[..., :3] * count
@@ -102,6 +105,13 @@ def picture(
         samples=samples,
         seconds=time.perf_counter() - began,
     )
+
+
+def _take_interrupts_back() -> None:
+    """Mitsuba's own handler of Ctrl-C outlives the rendering and drops what is pressed after it."""
+    handler = signal.getsignal(signal.SIGINT)
+    if handler is not None and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, handler)
 
 
 def _passes(samples: int, pixels: int) -> list[int]:
