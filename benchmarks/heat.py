@@ -16,7 +16,9 @@ import tracemalloc
 
 import numpy as np
 
-from nigemizu.heat import Diffusivity, GridSpec, HeldGround, Initial, Quantity, Unevenness, Wind
+from nigemizu.cli.bench.heat import copying, hot_ground_in_wind
+from nigemizu.cli.bench.timing import OFTEN, alternate
+from nigemizu.heat import GridSpec
 
 
 def main() -> None:
@@ -42,19 +44,14 @@ def measure(cells: tuple[int, int, int], steps: int) -> dict[str, object]:
     imported = time.perf_counter() - started
     grid = GridSpec(x=(0, 64), y=(0, 32), height=4, cells=cells, first_cell=0.002).build()
     tiny = GridSpec(x=(0, 8), y=(0, 8), height=4, cells=(8, 8, 8)).build()
-    setting = {
-        "ground": HeldGround(temperature=Quantity(value=330.0)),
-        "diffusivity": Diffusivity(kind="eddy", friction_velocity=0.1, cap_height=1.0),
-        "wind": Wind(speed=2.0, direction=30.0, shear="log"),
-    }
+    setting = hot_ground_in_wind()
     # the first call compiles the loops, or loads them when they were compiled before
     started = time.perf_counter()
     for _ in evolve(tiny, np.full(tiny.shape, 300.0), times=[1.0], **setting):
         pass
     first_call = time.perf_counter() - started
 
-    uneven = (Unevenness(amplitude=1.0, length=(2.0, 2.0, 0.5), seed=1, depth=1.0),)
-    initial = Initial(temperature=300.0, unevenness=uneven).sample(grid)
+    initial = np.random.default_rng(1).normal(300.0, 1.0, grid.shape)
     step = 0.1
     tracemalloc.start()
     volume_bytes = initial.nbytes
@@ -69,20 +66,15 @@ def measure(cells: tuple[int, int, int], steps: int) -> dict[str, object]:
     peak = tracemalloc.get_traced_memory()[1] / volume_bytes + 1
     tracemalloc.stop()
 
-    copy = np.empty_like(initial)
-    copies = []
-    for _ in range(10):
-        started = time.perf_counter()
-        np.copyto(copy, initial)
-        copies.append(time.perf_counter() - started)
+    copied = alternate({"copy": copying(initial)}, OFTEN)["copy"]
     updates = math.prod(cells) * steps / elapsed
     return {
         "cells (nx, ny, nz)": tuple(cells),
         "steps": steps,
         "cell-updates per second, million": updates / 1e6,
         "seconds per step": elapsed / steps,
-        "memory copy, million cells per s": math.prod(cells) / min(copies) / 1e6,
-        "step in memory copies": elapsed / steps / min(copies),
+        "memory copy, million cells per s": math.prod(cells) / copied / 1e6,
+        "step in memory copies": elapsed / steps / copied,
         "peak memory, volumes": peak,
         "import of the solver, s": imported,
         "first call (compiles or loads), s": first_call,

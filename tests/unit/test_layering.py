@@ -32,12 +32,12 @@ ROOMS: dict[str, set[str]] = {
 OUTSIDE: dict[str, set[str]] = {
     "air": {"numpy", "pydantic"},
     "heat": {"PIL", "numba", "numpy", "pydantic", "pydantic_core", "scipy", "xarray"},
-    "field": {"drjit", "numpy", "pydantic"},
+    "field": {"drjit", "numpy", "pydantic", "scipy"},
     "trace": {"drjit", "numpy", "pydantic"},
     "render": {"PIL", "drjit", "mitsuba", "numpy", "pydantic", "xarray"},
     "output": {"OpenEXR", "PIL", "av", "matplotlib", "netCDF4", "numpy", "pydantic", "xarray", "zarr"},
     "scene": {"drjit", "numpy", "pydantic", "xarray"},
-    "cli": {"drjit", "numba", "numpy", "pydantic", "rich", "xarray"},
+    "cli": {"drjit", "numba", "numpy", "pydantic", "rich", "scipy", "xarray"},
 }
 """What each room may import from outside, besides the standard library."""
 

@@ -11,13 +11,19 @@ from nigemizu.field.analytic import (
     Uniform,
 )
 from nigemizu.field.base import BoxedField, Field, UnboundedField
+from nigemizu.field.bottomless import Bottomless
+from nigemizu.field.cell import Cell
 from nigemizu.field.layers import Layers
 from nigemizu.field.placed import Placed
+from nigemizu.field.stratified import StratifiedVolume
+from nigemizu.field.tricubic import TricubicVolume
 from nigemizu.field.types import Types, types
 from nigemizu.field.volume import TrilinearVolume
 
 __all__ = [
+    "Bottomless",
     "BoxedField",
+    "Cell",
     "ExponentialSquare",
     "ExponentialTemperature",
     "Field",
@@ -28,6 +34,8 @@ __all__ = [
     "Luneburg",
     "ParabolicGrin",
     "Placed",
+    "StratifiedVolume",
+    "TricubicVolume",
     "TrilinearVolume",
     "Types",
     "UnboundedField",

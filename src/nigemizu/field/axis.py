@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, Final, final
+from typing import Any, Final, NamedTuple, final
 
 import drjit as dr
 import numpy as np
@@ -12,21 +12,42 @@ from numpy.typing import ArrayLike, NDArray
 from nigemizu.errors import InputError
 from nigemizu.field.types import Types
 
-__all__ = ["Axis", "BucketAxis", "UniformAxis", "make_axis"]
+__all__ = ["Axis", "BucketAxis", "Span", "UniformAxis", "make_axis"]
 
 UNIFORM_TOLERANCE: Final = 1e-6  # of the spacing: below what single precision can tell from uniform
 MOST_BUCKETS: Final = 1 << 17
 FEW_CORRECTIONS: Final = 1  # nodes allowed inside one bucket before the buckets are made finer
+NEAR_FACE: Final = 1e-4  # of the thinnest cell: as near to a face as this, a ray is on it
+ROUNDINGS: Final = 4  # units in the last place by which a ray that was sent to a face may miss it
+
+
+class Span(NamedTuple):
+    """One cell of an axis, for each ray."""
+
+    index: Any  #          UInt32        number of the lower node; that of the last node beyond it
+    node: Any  #           Float   m     a finite coordinate, from which offsets within the cell are taken
+    inverse_width: Any  #  Float   1/m   0 outside the nodes, where nothing changes along the axis
+    lower: Any  #          Float   m     `Axis.outer` below the first node of an extended axis
+    upper: Any  #          Float   m     the same above the last one
 
 
 class Axis(ABC):
-    """Nodes x₀ < x₁ < … of one axis; cell i spans [xᵢ, xᵢ₊₁), the last cell is closed."""
+    """Nodes x₀ < x₁ < … of one axis; cell i spans [xᵢ, xᵢ₊₁), the last cell is closed.
+
+    Attributes
+    ----------
+    outer : (float, float), m
+        Where the cells outside the nodes of an extended axis end.
+    """
 
     def __init__(self, nodes: NDArray[np.float64], types: Types) -> None:
         self._types = types
         self._first = float(nodes[0])
         self._last = float(nodes[-1])
         self._cells = len(nodes) - 1
+        self.outer = (-np.inf, np.inf)
+        self._near = NEAR_FACE * float(np.diff(nodes).min())
+        self._rounding = ROUNDINGS * (2.0**-23 if types.precision == "single" else 2.0**-52)
 
     @property
     def cells(self) -> int:
@@ -44,6 +65,50 @@ class Axis(ABC):
         inverse_width : Float or float — 1/(xᵢ₊₁ − xᵢ)
         """
 
+    def locate_ahead(
+        self, coordinate: Any, direction: Any, active: Any = True, *, extended: bool = False
+    ) -> Span:
+        """Cell that a moving coordinate is about to cross.
+
+        Parameters
+        ----------
+        coordinate : Float, m
+        direction : Float, 1
+            Which way it moves: on a face, or as near to one as rounding can tell, the cell ahead is
+            taken, unless there is none.
+        active : Bool
+        extended : bool
+            Take what lies outside the nodes for cells that reach to `outer` and in which nothing
+            changes; otherwise the outermost cells are taken there.
+
+        Returns
+        -------
+        Span
+        """
+        slack = dr.fma(abs(coordinate), self._rounding, self._near)
+        x = coordinate + dr.select(direction > 0, slack, dr.select(direction < 0, -slack, 0))
+        span = self._span(x, active)
+        if not extended:
+            return span
+        below, above = x < self._first, x > self._last
+        node = dr.select(above, self._last, span.node)
+        return Span(
+            index=dr.select(above, self._cells, span.index),
+            node=node,
+            # Two plain numbers would make the choice between them single precision.
+            inverse_width=dr.select(below | above, self._types.Float(0), span.inverse_width),
+            lower=dr.select(below, self._types.Float(self.outer[0]), node),
+            upper=dr.select(below, self._first, dr.select(above, self._types.Float(self.outer[1]), span.upper)),
+        )
+
+    @abstractmethod
+    def node(self, index: Any, active: Any = True) -> Any:
+        """Coordinate (Float, m) of a node by its number (UInt32), the same to the bit in all spans."""
+
+    @abstractmethod
+    def _span(self, x: Any, active: Any) -> Span:
+        """Cell of a coordinate, the outermost one outside the nodes."""
+
 
 @final
 class UniformAxis(Axis):
@@ -58,6 +123,17 @@ class UniformAxis(Axis):
         scaled = dr.clip(scaled, 0, float(self._cells))
         index = dr.minimum(self._types.UInt32(scaled), self._cells - 1)
         return index, scaled - self._types.Float(index), self._inverse_width
+
+    def node(self, index: Any, active: Any = True) -> Any:
+        # The last node is the face of the field: not a rounding beside it.
+        within = dr.fma(self._types.Float(index), 1 / self._inverse_width, self._first)
+        return dr.select(index >= self._cells, self._last, within)
+
+    def _span(self, x: Any, active: Any) -> Span:
+        scaled = (x - self._first) * self._inverse_width
+        index = self._types.UInt32(dr.clip(scaled, 0, float(self._cells - 1)))
+        lower, upper = self.node(index), self.node(index + 1)
+        return Span(index, lower, self._inverse_width, lower, upper)
 
 
 @final
@@ -87,13 +163,12 @@ class BucketAxis(Axis):
         self._table = types.UInt32(table)
         self._nodes = types.Float(stored)
         self._inverse_widths = types.Float((1.0 / np.diff(nodes)).astype(dtype))
+        self._packets = self._pack(table, stored)
 
     def locate(self, coordinate: Any, active: Any = True) -> tuple[Any, Any, Any]:
         types = self._types
         x = dr.clip(coordinate, self._first, self._last)
-        raised = types.Float32(x - self._origin) + self._offset
-        bits: Any = dr.reinterpret_array(types.UInt32, raised)
-        bucket = dr.minimum((bits >> self._shift) - self._key, self.buckets - 1)
+        bucket = self._bucket(x)
         index = dr.gather(types.UInt32, self._table, bucket, active)
         for _ in range(self.corrections - 1):
             above = dr.gather(types.Float, self._nodes, index + 1, active)
@@ -105,6 +180,38 @@ class BucketAxis(Axis):
         inverse_width = dr.gather(types.Float, self._inverse_widths, index, active)
         from_node = (x - node) * inverse_width
         return index, dr.clip(dr.select(passed, from_node, 1 + from_node), 0, 1), inverse_width
+
+    def node(self, index: Any, active: Any = True) -> Any:
+        return dr.gather(self._types.Float, self._nodes, index, active)
+
+    def _span(self, x: Any, active: Any) -> Span:
+        types = self._types
+        x = dr.clip(x, self._first, self._last)
+        if self._packets is None:
+            index, _, inverse_width = self.locate(x, active)
+            lower, upper = self.node(index, active), self.node(index + 1, active)
+            return Span(index, lower, inverse_width, lower, upper)
+        # One access gives the cell and, if a node is passed, the next one.
+        packet = dr.gather(types.Array4f, self._packets, self._bucket(x), active)
+        index = types.UInt32(packet[0])
+        passed = (x >= packet[2]) & (index < self._cells - 1)
+        index = dr.select(passed, index + 1, index)
+        lower = dr.select(passed, packet[2], packet[1])
+        upper = dr.select(passed, packet[3], packet[2])
+        inverse_width = dr.gather(types.Float, self._inverse_widths, index, active)
+        return Span(index, lower, inverse_width, lower, upper)
+
+    def _bucket(self, x: Any) -> Any:
+        raised = self._types.Float32(x - self._origin) + self._offset
+        bits: Any = dr.reinterpret_array(self._types.UInt32, raised)
+        return dr.minimum((bits >> self._shift) - self._key, self.buckets - 1)
+
+    def _pack(self, table: NDArray[np.uint32], nodes: NDArray[Any]) -> Any:
+        """Per bucket its cell and the three nodes from there on; None if a bucket may pass more than one."""
+        if self.corrections > 1 or self._cells >= 1 << 24:  # beyond which single precision cannot count
+            return None
+        following = np.minimum(table[:, None] + np.arange(3), self._cells)
+        return self._types.table(np.column_stack([table, nodes[following]]))
 
 
 def make_axis(nodes: ArrayLike, types: Types, *, key: str) -> Axis:

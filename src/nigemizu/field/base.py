@@ -7,6 +7,7 @@ from typing import Any
 
 import drjit as dr
 
+from nigemizu.field.cell import Cell
 from nigemizu.field.types import Types
 
 __all__ = ["BoxedField", "Field", "UnboundedField"]
@@ -42,6 +43,28 @@ class Field(ABC):
         n : Float, 1 — the full index, not n − 1
         gradient : Array3f, 1/m
         """
+
+    def cell(self, position: Any, direction: Any, active: Any = True) -> Cell:
+        """The piece of the field that a ray is about to cross.
+
+        Parameters
+        ----------
+        position : Array3f, m
+        direction : Array3f, 1
+            Of any length. Where the position lies on a face, the piece ahead is taken.
+        active : Bool
+            Rays that take part.
+
+        Returns
+        -------
+        Cell
+        """
+        return Cell(lambda point: self.value_and_gradient(point, active))
+
+    @property
+    def stratified(self) -> bool:
+        """Whether the index depends on z alone, in a region that has no bounds in x and y."""
+        return False
 
     @abstractmethod
     def contains(self, position: Any) -> Any:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from nigemizu.errors import InputError
 from nigemizu.field.base import Field
+from nigemizu.field.cell import Cell
 
 __all__ = ["Placed"]
 
@@ -33,7 +34,8 @@ class Placed(Field):
     Notes
     -----
     Positions come, and gradients go, in scene units: n is unchanged, ∇n is rotated and divided by the
-    scale.
+    scale. A cell keeps its bounds where the rotation takes axes to axes; after any other rotation its
+    reach is that of the straight line to the faces of the inner field's cell.
     """
 
     def __init__(self, field: Field, to_world: ArrayLike) -> None:
@@ -56,10 +58,35 @@ class Placed(Field):
         self._scale = scale
         self._rotation = linear / scale
         self._shift = matrix[:3, 3]
+        # Which of the field's axes lies along each of the scene's, if each lies along one.
+        rounded = np.round(self._rotation)
+        turned = not np.allclose(self._rotation, rounded, rtol=0, atol=1e-12)
+        self._axis_along = None if turned else [int(np.argmax(np.abs(row))) for row in rounded]
 
     def value_and_gradient(self, position: Any, active: Any = True) -> tuple[Any, Any]:
-        n, gradient = self._field.value_and_gradient(self._local_point(position), active)
-        return n, self._rotate(self._rotation, gradient) / self._scale
+        return self._outwards(self._field.value_and_gradient(self._local_point(position), active))
+
+    def cell(self, position: Any, direction: Any, active: Any = True) -> Cell:
+        point, ahead = self._local_point(position), dr.normalize(self._local_vector(direction))
+        inner = self._field.cell(point, ahead, active)
+        lower, upper = None, None
+        reach = None if inner.reach is None else inner.reach * self._scale
+        if inner.lower is not None and self._axis_along is not None:
+            lower, upper = self._turned_bounds(inner, self._axis_along)
+        elif inner.lower is not None:
+            # A ray that is sent to a face must come to lie on it or beyond: not less than the rounding.
+            rounding = dr.max(abs(point)) * (2.0**-19 if self.types.precision == "single" else 2.0**-48)
+            to_faces = dr.maximum(inner.exit(point, ahead), rounding) * self._scale
+            reach = to_faces if reach is None else dr.minimum(reach, to_faces)
+
+        def value_and_gradient(position: Any) -> tuple[Any, Any]:
+            return self._outwards(inner.value_and_gradient(self._local_point(position)))
+
+        return Cell(value_and_gradient, lower, upper, reach)
+
+    @property
+    def stratified(self) -> bool:
+        return self._field.stratified and bool(abs(self._rotation[2, 2] - 1) < 1e-12)
 
     def contains(self, position: Any) -> Any:
         return self._field.contains(self._local_point(position))
@@ -76,3 +103,20 @@ class Placed(Field):
     def _rotate(self, rotation: np.ndarray[Any, Any], vector: Any) -> Any:
         rows = (self.types.Array3f(*row) for row in rotation.tolist())
         return self.types.Array3f(*(dr.dot(row, vector) for row in rows))
+
+    def _outwards(self, result: tuple[Any, Any]) -> tuple[Any, Any]:
+        """Index and gradient of the field, in the scene's axes and unit."""
+        n, gradient = result
+        return n, self._rotate(self._rotation, gradient) / self._scale
+
+    def _turned_bounds(self, inner: Cell, axis_along: list[int]) -> tuple[Any, Any]:
+        """Corners of the inner cell in the scene, where each axis lies along one of the field's."""
+        lower, upper = self.types.Array3f(0), self.types.Array3f(0)
+        for axis, along in enumerate(axis_along):
+            # Not by the matrix: zero times an infinite bound is no number.
+            one, other = (
+                dr.fma(bound[along], self._scale * float(np.round(self._rotation[axis, along])), shift)
+                for bound, shift in ((inner.lower, self._shift[axis]), (inner.upper, self._shift[axis]))
+            )
+            lower[axis], upper[axis] = dr.minimum(one, other), dr.maximum(one, other)
+        return lower, upper

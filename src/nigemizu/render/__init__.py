@@ -28,7 +28,8 @@ from nigemizu.render.objects import (
 
 if TYPE_CHECKING:
     from nigemizu.render.assembly import build
-    from nigemizu.render.bending import Frame, medium_of, surface_query
+    from nigemizu.render.frame import Frame, surface_query
+    from nigemizu.render.media import medium_of
     from nigemizu.render.passes import Picture, picture
     from nigemizu.render.path_tracer import integrator
     from nigemizu.render.settings import Settings
@@ -69,16 +70,16 @@ __all__ = [
 
 # Loaded when first used: these modules import Mitsuba.
 _NEEDS_MITSUBA: Final = {
-    "Frame": "bending",
+    "Frame": "frame",
     "Picture": "passes",
     "Settings": "settings",
     "build": "assembly",
     "integrator": "path_tracer",
-    "medium_of": "bending",
+    "medium_of": "media",
     "picture": "passes",
     "register": "variant",
     "select_variant": "variant",
-    "surface_query": "bending",
+    "surface_query": "frame",
 }
 
 

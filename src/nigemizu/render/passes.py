@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from nigemizu.errors import InputError
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.render.path_tracer import STATUSES
+from nigemizu.render.report import ErrorReport
 
 __all__ = ["Picture", "picture"]
 
@@ -38,12 +39,15 @@ class Picture:
         Rays per pixel.
     seconds : float
         Time that the rays took, compilation included.
+    report : ErrorReport or None
+        Their errors; None where the scene's integrator is not nigemizu's, or bends nothing.
     """
 
     radiance: NDArray[np.float32]
     statuses: dict[str, int]
     samples: int
     seconds: float
+    report: ErrorReport | None = None
 
 
 def picture(
@@ -104,6 +108,7 @@ def picture(
         statuses={name: int(number) for name, number in zip(STATUSES, counts, strict=False)},
         samples=samples,
         seconds=time.perf_counter() - began,
+        report=integrator.report(scene, sensor) if counted else None,
     )
 
 

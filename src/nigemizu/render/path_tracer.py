@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any, Final
 
 import drjit as dr
@@ -11,7 +12,10 @@ import numpy as np
 
 from nigemizu import trace
 from nigemizu.errors import InputError
-from nigemizu.render.bending import AirResolver, Bending, Frame, field_from_air
+from nigemizu.render.bending import Bending
+from nigemizu.render.frame import Frame
+from nigemizu.render.media import AirResolver, axes_of, medium_of
+from nigemizu.render.report import ErrorReport, measure
 from nigemizu.render.settings import Settings, read_settings
 
 __all__ = ["STATUSES", "integrator", "integrator_class"]
@@ -58,12 +62,13 @@ def integrator_class(variant: str) -> Any:
     """The integrator's class under `variant`, which must be the one in use."""
 
     class NigemizuIntegrator(mi.SamplingIntegrator):
-        """Path tracer with emitter sampling whose camera and scattered segments are bent by air.
+        """Path tracer with emitter sampling: what the eye sees, in mirrors too, is bent by air.
 
         Symbols: β throughput, L radiance, η relative index of refraction so far, s path length.
 
-        Limits: shadow rays are straight, so that shadows and light seen through the air are not displaced;
-        radiance is not divided by n² (3·10⁻⁴ relative at most in air); no polarization.
+        Limits: shadow rays and what rough surfaces scatter go straight, so that shadows and light that
+        reaches a surface through the air are not displaced; radiance is not divided by n² (3·10⁻⁴
+        relative at most in air); no polarization.
         """
 
         def __init__(
@@ -75,29 +80,39 @@ def integrator_class(variant: str) -> Any:
             frame: Frame | None = None,
             resolve_air: AirResolver | None = None,
         ) -> None:
+            reference: Callable[[], Any] | None = None
             super().__init__(props if props is not None else mi.Properties("nigemizu"))
             if settings is None:
                 settings, frame = _settings_of(props)
                 if settings.air is not None and settings.tracer.method != "straight":
-                    medium = field_from_air(settings, resolve_air)
+                    medium, reference = _media(settings, resolve_air)
             self.settings = settings
             self.frame = frame or Frame(np.eye(3), 1.0, np.zeros(3))
             visibility = settings.visibility
             self.extinction = 0.0 if visibility is None else KOSCHMIEDER / (visibility * self.frame.scale)
             self.limit_depth = 2**32 - 1 if settings.max_depth < 0 else settings.max_depth
+            self.bends_scattered = True
             self.reset_counts()
-            self.set_medium(medium)
+            self.bending = Bending(medium, settings.tracer, self.frame, reference)
 
-        def set_medium(self, medium: Any) -> None:
-            """Put other air in; of the same kind and shape it reuses the compiled kernel."""
-            self.bending = Bending(medium, self.settings.tracer, self.frame)
+        def set_medium(self, medium: Any, reference: Callable[[], Any] | None = None) -> None:
+            """Put other air in; of the same kind and shape it reuses the compiled kernel.
+
+            `reference` makes the same air in double precision, against which errors are measured.
+            """
+            self.bending.set_medium(medium, reference)
 
         def render(self, scene: Any, sensor: Any = 0, *args: Any, **options: Any) -> Any:
-            """Render (the interface of `mi.Integrator`); measures a pixel for the chord tolerance first."""
+            """Render (the interface of `mi.Integrator`); lays the paths that the picture's rays share first."""
             if isinstance(sensor, int):
                 sensor = scene.sensors()[sensor]
-            self.bending.set_pixel_angle(pixel_angle(sensor))
+            self.bends_scattered = self.bending.method != "straight" and _has_mirrors(scene)
+            self.bending.prepare(scene, sensor)
             return super().render(scene, sensor, *args, **options)
+
+        def report(self, scene: Any, sensor: Any) -> ErrorReport | None:
+            """Errors of the rays of the last picture, which must have been of this scene and sensor."""
+            return measure(self.bending, scene, sensor)
 
         def reset_counts(self) -> None:
             """Set the counters of camera rays per status to zero."""
@@ -117,22 +132,18 @@ def integrator_class(variant: str) -> Any:
             η = mi.Float(1)
             valid = mi.Bool(False)
             first = mi.Bool(True)
-            previous = dr.zeros(mi.SurfaceInteraction3f)
+            previous = dr.zeros(mi.Interaction3f)
             pdf_previous = mi.Float(1)
             delta_previous = mi.Bool(True)
-            counts = self.counts
+
+            # ---------------------- the bent segment from the eye ----------------------
+            ray, met, s, status = self.bending.follow_from_eye(scene, ray, active)
 
             while dr.hint(active, label="nigemizu"):
-                # ---------------------- follow the bent segment ----------------------
-                ray, s, status = self.bending.advance(scene, ray, active)
-                # not "coherent", see `surface_query`
-                si = scene.ray_intersect(ray, mi.RayFlags.All, False, active)
+                # ---------------------- what its last straight piece meets ----------------------
+                si = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
                 s += dr.select(si.is_valid(), si.t, 0)
-                # Leaving the air is not the end: what lies behind it may still be met.
-                ended = dr.select(
-                    status == int(trace.RayStatus.OUT_OF_STEPS), 2, dr.select(si.is_valid(), 0, 1)
-                )
-                dr.scatter_reduce(dr.ReduceOp.Add, counts, mi.UInt32(1), mi.UInt32(ended), active & first)
+                self.count(status, si, active & first)
                 first = mi.Bool(False)
 
                 # ---------------------- haze between eye and surface ----------------------
@@ -171,7 +182,7 @@ def integrator_class(variant: str) -> Any:
                 valid |= active & si.is_valid() & ~hidden & (depth + 1 >= self.limit_depth)
                 β[onward] *= throughput
                 η[onward] *= bs.eta
-                previous = dr.select(onward, si, previous)
+                previous.p = dr.select(onward, si.p, previous.p)
                 pdf_previous = dr.select(onward, bs.pdf, pdf_previous)
                 delta_previous = dr.select(
                     onward, mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta), delta_previous
@@ -194,7 +205,26 @@ def integrator_class(variant: str) -> Any:
                 ray = mi.Ray3f(next_ray)
                 active = onward | passed
 
+                # ---------------------- the next segment ----------------------
+                s = mi.Float(0)
+                mirrored = active & (delta_previous | passed) & self.bends_scattered
+                met = scene.ray_intersect_preliminary(ray, False, active & ~mirrored)
+                if dr.hint(self.bends_scattered, mode="scalar"):
+                    last, met_last, before, _ = self.bending.follow(scene, ray, mirrored)
+                    ray.o = dr.select(mirrored, last.o, ray.o)
+                    ray.d = dr.select(mirrored, last.d, ray.d)
+                    met = dr.select(mirrored, met_last, met)
+                    s = dr.select(mirrored, before, s)
+
             return L, valid | self.shows_environment(scene), []
+
+        def count(self, status: Any, si: Any, active: Any) -> None:
+            """Count how camera rays end, in the order of `STATUSES`."""
+            # Leaving the air is not the end: what lies behind it may still be met.
+            lost = status == int(trace.RayStatus.OUT_OF_STEPS)
+            hit = si.is_valid() & ~lost
+            for index, ended in enumerate((hit, ~hit & ~lost, lost)):
+                dr.scatter_reduce(dr.ReduceOp.Add, self.counts, mi.UInt32(1), mi.UInt32(index), active & ended)
 
         def horizon_radiance(self, scene: Any, ray: Any, active: Any) -> Any:
             """Radiance of the sky at the horizon, in the azimuth of `ray`."""
@@ -221,19 +251,24 @@ def integrator_class(variant: str) -> Any:
     return NigemizuIntegrator
 
 
-def pixel_angle(sensor: Any) -> float:
-    """Angle between the rays through two neighbouring pixels in the middle of the picture, rad."""
-    ray, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(0.5), mi.Point2f(0.5))
-    sine = dr.norm(dr.cross(ray.d, dr.normalize(ray.d_x)))
-    # An orthographic sensor has parallel rays; any small angle does.
-    return max(float(sine[0]), 1e-7)
-
-
 def _balance(pdf_a: Any, pdf_b: Any) -> Any:
     """Weight of strategy a by the power heuristic."""
     a2, b2 = pdf_a * pdf_a, pdf_b * pdf_b
     weight = a2 / (a2 + b2)
     return dr.select(dr.isfinite(weight), weight, 0)
+
+
+def _has_mirrors(scene: Any) -> bool:
+    """Whether anything in the scene reflects or passes light without scattering it."""
+    flags = mi.BSDFFlags.Delta
+    return any(mi.has_flag(shape.bsdf().flags(), flags) for shape in scene.shapes() if shape.bsdf() is not None)
+
+
+def _media(settings: Settings, resolve_air: AirResolver | None) -> tuple[Any, Callable[[], Any]]:
+    """The air of the plug-in properties, and how the same is had in double precision."""
+    axes = axes_of(settings, resolve_air)
+    reference = functools.partial(medium_of, *axes, tracer=settings.tracer, precision="double")
+    return medium_of(*axes, tracer=settings.tracer), reference
 
 
 def _settings_of(props: Any) -> tuple[Settings, Frame | None]:

@@ -13,7 +13,7 @@ from nigemizu import field
 from nigemizu.errors import InputError, MachineError
 
 if TYPE_CHECKING:
-    from nigemizu.render.bending import AirResolver
+    from nigemizu.render.media import AirResolver
 
 __all__ = ["BACKENDS", "current_backend", "register", "select_variant"]
 

@@ -18,16 +18,18 @@ from typing import TYPE_CHECKING, TypeAlias
 from nigemizu.errors import MachineError
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.scene.digest import air_digest
-from nigemizu.scene.rendering import Studio, warn_of_long_steps, warn_of_lost_rays
+from nigemizu.scene.rendering import Studio, warn_of_errors, warn_of_lost_rays
 from nigemizu.scene.running import AirSource, AirVolume, Variant, air_instants, open_air, require_within
 
 if TYPE_CHECKING:
     from nigemizu.output import FrameFolder
+    from nigemizu.render.report import ErrorReport
     from nigemizu.scene.model import Scene
 
 __all__ = ["animate", "frames_folder"]
 
 _Job: TypeAlias = tuple[int, AirVolume | None, Path]
+_Outcome: TypeAlias = "tuple[dict[str, int], ErrorReport | None]"
 
 
 def animate(
@@ -64,11 +66,11 @@ def animate(
     progress.advance(folder.count - len(missing))
     jobs = _jobs(scene, folder, missing, air)
     if workers == 1:
-        statuses = _render_here(scene, jobs, variant, progress)
+        outcomes = _render_here(scene, jobs, variant, progress)
     else:
-        statuses = _render_in_processes(scene, jobs, variant, workers, progress)
+        outcomes = _render_in_processes(scene, jobs, variant, workers, progress)
     progress.finish()
-    warn_of_lost_rays(statuses, scene)
+    _warn(outcomes, scene)
     return write_film(path, folder.frames(), fps=scene.film.fps, provenance=provenance, progress=progress)
 
 
@@ -101,51 +103,60 @@ def _jobs(scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSou
     wanted = frozenset(missing)
     times = scene.film.times[: missing[-1] + 1]
     for index, volume in enumerate(air_instants(scene, times, air, SILENT)):
-        if index == missing[0] and scene.tracer.method == "bent":
-            warn_of_long_steps(volume, scene)
         if index in wanted:
             yield index, volume, folder.frame(index)
 
 
+def _warn(outcomes: Sequence[_Outcome], scene: Scene) -> None:
+    """Say of all frames together what is said of one picture."""
+    statuses: Counter[str] = Counter()
+    for outcome in outcomes:
+        statuses.update(outcome[0])
+    warn_of_lost_rays(statuses, scene)
+    reports = [outcome[1] for outcome in outcomes if outcome[1] is not None]
+    if reports:
+        warn_of_errors(type(reports[0]).joined(reports), scene)
+
+
 def _render_here(
     scene: Scene, jobs: Iterator[_Job], variant: Variant, progress: ProgressMeter
-) -> Counter[str]:
+) -> list[_Outcome]:
     studio: Studio | None = None
-    statuses: Counter[str] = Counter()
+    outcomes = []
     for index, air, frame in jobs:
         studio = studio or Studio(scene, variant)
         picture = studio.shoot(air, frame=index, progress=progress)
         picture.save(frame)
-        statuses.update(picture.statuses)
+        outcomes.append((picture.statuses, picture.report))
         progress.advance()
-    return statuses
+    return outcomes
 
 
 def _render_in_processes(
     scene: Scene, jobs: Iterator[_Job], variant: Variant, workers: int, progress: ProgressMeter
-) -> Counter[str]:
+) -> list[_Outcome]:
     """Few instants are under way at once, so that the air of a long film is never held as a whole."""
     threads = max(1, (os.cpu_count() or 1) // workers)
     toml = scene.to_toml()
-    statuses: Counter[str] = Counter()
+    outcomes: list[_Outcome] = []
     with _pool(workers) as pool:
-        waiting: set[Future[dict[str, int]]] = set()
+        waiting: set[Future[_Outcome]] = set()
         for job in jobs:
             if len(waiting) >= 2 * workers:
-                waiting = _collect(waiting, statuses, progress)
+                waiting = _collect(waiting, outcomes, progress)
             waiting.add(pool.submit(_render_one, toml, variant, threads, job))
         while waiting:
-            waiting = _collect(waiting, statuses, progress)
-    return statuses
+            waiting = _collect(waiting, outcomes, progress)
+    return outcomes
 
 
 def _collect(
-    waiting: set[Future[dict[str, int]]], statuses: Counter[str], progress: ProgressMeter
-) -> set[Future[dict[str, int]]]:
+    waiting: set[Future[_Outcome]], outcomes: list[_Outcome], progress: ProgressMeter
+) -> set[Future[_Outcome]]:
     done, rest = wait(waiting, return_when=FIRST_COMPLETED)
     for future in done:
         try:
-            statuses.update(future.result())
+            outcomes.append(future.result())
         except BrokenProcessPool as error:
             raise MachineError(
                 "a rendering process was killed, perhaps for want of memory; use fewer --workers"
@@ -178,11 +189,11 @@ def _prepare_process() -> None:
     warnings.simplefilter("ignore")
 
 
-def _render_one(toml: str, variant: Variant, threads: int, job: _Job) -> dict[str, int]:
+def _render_one(toml: str, variant: Variant, threads: int, job: _Job) -> _Outcome:
     index, air, frame = job
     picture = _studio(toml, variant, threads).shoot(air, frame=index)
     picture.save(frame)
-    return picture.statuses
+    return picture.statuses, picture.report
 
 
 @functools.cache

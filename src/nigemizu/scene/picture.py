@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from nigemizu.render.report import ErrorReport
     from nigemizu.scene.model import Scene
 
 __all__ = ["RenderedPicture"]
@@ -29,11 +30,14 @@ class RenderedPicture:
         Number of camera rays that ended as ``hit``, ``escaped`` and ``out-of-steps``.
     scene : Scene
         What was rendered.
+    report : ErrorReport or None
+        Estimated errors of the bent rays; None where none are bent.
     """
 
     pixels: NDArray[np.float32]
     statuses: dict[str, int]
     scene: Scene
+    report: ErrorReport | None = None
 
     def save(self, path: str | os.PathLike[str], *, command: str = "") -> Path:
         """Write ``.png`` (8 bits, sRGB) or ``.exr`` (linear), whole or not at all, and return where it is.

@@ -30,6 +30,7 @@ _FAN: Final = 41  # rays of the fan that is traced when no elevations are given
 _GRAZING: Final = (-1.0, 0.25)  # degrees; what air can turn lies here
 _STATUSES: Final = ("hit", "escaped", "out-of-steps")
 _POINTS: Final = 2000  # points kept along a path, about
+_FINER: Final = 0.01  # of the accuracy of pictures, for rays as data
 
 
 @final
@@ -232,8 +233,12 @@ def _follow(
             through, origin, ahead, max_crossings=tracer.max_steps, surface=surface, details=True
         )
         return end, _pane_paths(scene, through, origin, ahead, surface) if paths else ()
-    stepper = trace.stepper_named(tracer.stepper)
-    march = {"step": tracer.step, "max_steps": tracer.max_steps, "stepper": stepper, "surface": surface}
+    march: dict[str, Any] = {"max_steps": tracer.max_steps, "surface": surface}
+    if tracer.step is None:
+        pixel = scene.camera.pixel_angle
+        march |= {"accuracy": tracer.angle(pixel) * _FINER, "chord_tolerance": tracer.chord_tolerance * pixel * _FINER}
+    else:
+        march |= {"step": tracer.step, "stepper": trace.stepper_named(tracer.stepper)}
     end = trace.march(through, origin, ahead, details=True, **march)
     if not paths:
         return end, ()

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, final
-
-import numpy as np
 
 from nigemizu.errors import NigemizuWarning
 from nigemizu.progress import SILENT, ProgressMeter
@@ -14,16 +13,14 @@ from nigemizu.scene.picture import RenderedPicture
 from nigemizu.scene.running import AirSource, AirVolume, Variant, air_at
 
 if TYPE_CHECKING:
+    from nigemizu.render.report import ErrorReport
     from nigemizu.scene.model import Scene
 
-__all__ = ["Studio", "render", "warn_of_lost_rays"]
+__all__ = ["Studio", "render", "warn_of_errors", "warn_of_lost_rays"]
 
 # Up to a row of pixels at the horizon is nothing to warn of: over flat ground its light runs level for ever.
 _SEEN_SHARE: Final = 5e-3
-# Steps that a ray needs while it is turned back, and the share of the mirage's height that may lack them.
-_TURN_STEPS: Final = 4
-_RAGGED_SHARE: Final = 0.2
-
+_FIXED_STEP_ERROR: Final = 1.0  # pixels that a fixed step may err by without a warning
 
 @final
 class Studio:
@@ -59,9 +56,13 @@ class Studio:
         """Render the scene through `air` (None: no air); each `frame` draws its own random numbers."""
         from nigemizu.render import medium_of, picture
 
-        scene = self._scene
-        self._integrator.set_medium(None if air is None else medium_of(*air[:4], tracer=scene.tracer))
-        camera = scene.camera
+        scene, camera = self._scene, self._scene.camera
+        if air is None:
+            self._integrator.set_medium(None)
+        else:
+            angle = scene.tracer.angle(camera.pixel_angle)
+            make = partial(medium_of, *air[:4], tracer=scene.tracer, angle=angle)
+            self._integrator.set_medium(make(), partial(make, precision="double", storage="single"))
         taken = picture(
             self._built,
             samples=camera.samples,
@@ -70,7 +71,7 @@ class Studio:
             exposure=camera.exposure,
             progress=progress,
         )
-        return RenderedPicture(taken.radiance, taken.statuses, scene)
+        return RenderedPicture(taken.radiance, taken.statuses, scene, taken.report)
 
 
 def render(
@@ -80,37 +81,36 @@ def render(
     scene.check()
     studio = Studio(scene, variant)
     volume = None if scene.tracer.method == "straight" else air_at(scene, time, air, progress)
-    if volume is not None and scene.tracer.method == "bent":
-        warn_of_long_steps(volume, scene)
     picture = studio.shoot(volume, progress=progress)
     warn_of_lost_rays(picture.statuses, scene)
+    if picture.report is not None:
+        warn_of_errors(picture.report, scene)
     return picture
 
 
-def warn_of_long_steps(air: AirVolume, scene: Scene) -> None:
-    """Warn when much of the light that the air turns back would be turned within a few steps.
-
-    A ray that arrives at the angle θ = √(2 Δn) and turns where the gradient is g does so over the length
-    2 θ / g. With fewer than some four steps along it, neighbouring rays turn differently: noise.
-    """
-    below = air.z <= scene.camera.eye[2]
-    height, index = air.z[below], air.refractivity.mean(axis=(1, 2))[below]
-    if height.size < 2:
-        return
-    gradient = np.diff(index) / np.diff(height)
-    angle = np.sqrt(2.0 * (index.max() - index))
-    length = np.divide(
-        angle[1:] + angle[:-1], gradient, out=np.full_like(gradient, np.inf), where=gradient > 0.0
-    )
-    ragged = length < _TURN_STEPS * scene.tracer.step
-    if np.sum((angle[:-1] - angle[1:])[ragged]) > _RAGGED_SHARE * angle.max():
-        shortest = float(length[ragged].min())
+def warn_of_errors(report: ErrorReport, scene: Scene) -> None:
+    """Warn when what was seen of the errors is larger than the scene asks for."""
+    tracer, pixel = scene.tracer, scene.camera.pixel_angle
+    if tracer.step is None:
+        asked = tracer.angle(pixel) / pixel
+        remedy = _remedy(scene)
+    else:
+        asked, remedy = _FIXED_STEP_ERROR, "shorten tracer.step, or leave it out for steps that adapt"
+    if report.worst > asked:
+        wanted = "" if tracer.step is not None else f" where {asked:.2g} were asked for"
         warnings.warn(
-            f"the air turns light back within {shortest:.2g} m, which a step of {scene.tracer.step:g} m "
-            f"makes ragged; set tracer.step to {shortest / _TURN_STEPS / 2:.1g} or less",
+            f"what is seen is displaced by up to {report.worst:.2g} pixels (mean {report.mean:.2g}){wanted}; "
+            f"{remedy}",
             NigemizuWarning,
             stacklevel=4,
         )
+
+
+def _remedy(scene: Scene) -> str:
+    tracer = scene.tracer
+    if tracer.precision != "double":
+        return "set tracer.precision = 'double'"
+    return "set tracer.sharing = false" if tracer.sharing else "ask for less with tracer.accuracy"
 
 
 def warn_of_lost_rays(statuses: Mapping[str, int], scene: Scene) -> None:
@@ -120,7 +120,7 @@ def warn_of_lost_rays(statuses: Mapping[str, int], scene: Scene) -> None:
     if share > _SEEN_SHARE:
         warnings.warn(
             f"{share:.2%} of the rays used up their {scene.tracer.max_steps} steps before they ended; "
-            "raise tracer.max_steps or tracer.step",
+            "raise tracer.max_steps, or ask for less with tracer.accuracy",
             NigemizuWarning,
             stacklevel=4,
         )

@@ -4,13 +4,16 @@ from nigemizu.trace.ends import ESCAPED, HIT, NOT_TRACED, OUT_OF_STEPS, STOPPED,
 from nigemizu.trace.layered import cross_layers, straight
 from nigemizu.trace.march import march
 from nigemizu.trace.paths import record_paths
+from nigemizu.trace.shared import SharedPaths, SharingReport, grounded, share_paths
 from nigemizu.trace.steppers import EULER, LEAPFROG, STEPPERS, SUZUKI4, YOSHIDA4, Stepper, stepper_named
 from nigemizu.trace.surfaces import Surface, combine, ground_plane
 from nigemizu.trace.tracer import Tracer
+from nigemizu.trace.view import ElevationView, View
 
 __all__ = [
     "ESCAPED",
     "EULER",
+    "ElevationView",
     "HIT",
     "LEAPFROG",
     "NOT_TRACED",
@@ -21,14 +24,19 @@ __all__ = [
     "YOSHIDA4",
     "RayEnd",
     "RayStatus",
+    "SharedPaths",
+    "SharingReport",
     "Stepper",
     "Surface",
     "Tracer",
+    "View",
     "combine",
     "cross_layers",
     "ground_plane",
+    "grounded",
     "march",
     "record_paths",
+    "share_paths",
     "stepper_named",
     "straight",
 ]

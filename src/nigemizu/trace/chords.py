@@ -25,11 +25,12 @@ class Chord:
     start: Any  #      Float    m    length of the path before it
     found: Any  #      Bool          whether it meets a surface
     distance: Any  #   Float    m    from the origin to the hit (its length, where there is none)
+    mark: Any = None  #              what else the surface says of the hit
 
     @classmethod
-    def along(cls, origin: Any, direction: Any, length: Any, start: Any) -> Chord:
-        """A piece that has not been tested yet."""
-        return cls(origin, direction, length, start, dr.mask_t(length)(False), length)
+    def along(cls, origin: Any, direction: Any, length: Any, start: Any, blank: Any = None) -> Chord:
+        """A piece that has not been tested yet; `blank` stands for what a surface says where nothing is."""
+        return cls(origin, direction, length, start, dr.mask_t(length)(False), length, blank)
 
     @classmethod
     def between(cls, begin: Any, end: Any, start: Any) -> Chord:
@@ -40,9 +41,10 @@ class Chord:
 
     def test(self, surface: Surface, active: Any) -> Chord:
         """The piece with the surface's answer. Rays that are not active meet nothing."""
-        hit, distance = surface(self.origin, self.direction, self.length * (1 + OVERLAP), active)
+        hit, distance, *marks = surface(self.origin, self.direction, self.length * (1 + OVERLAP), active)
         found = hit & active
-        return replace(self, found=found, distance=dr.select(found, distance, self.length))
+        mark = marks[0] if marks else None
+        return replace(self, found=found, distance=dr.select(found, distance, self.length), mark=mark)
 
     def replaced(self, later: Chord, active: Any) -> Chord:
         """The later piece where rays are active, this one elsewhere."""
@@ -53,6 +55,7 @@ class Chord:
             start=dr.select(active, later.start, self.start),
             found=dr.select(active, later.found, self.found),
             distance=dr.select(active, later.distance, self.distance),
+            mark=self.mark if later.mark is None else dr.select(active, later.mark, self.mark),
         )
 
     def at(self, distance: Any) -> Any:

@@ -36,7 +36,7 @@ _MESSAGES = {
     RayStatus.NOT_TRACED: "the ray was masked out",
     RayStatus.HIT: "the ray met a surface",
     RayStatus.ESCAPED: "the ray left the air volume and met nothing beyond",
-    RayStatus.OUT_OF_STEPS: "the ray used up its steps; raise max_steps or the step",
+    RayStatus.OUT_OF_STEPS: "the ray used up its steps; raise max_steps, or ask for less accuracy",
     RayStatus.STOPPED: "the ray went the whole distance that was asked for",
 }
 
@@ -78,6 +78,13 @@ class RayEnd:
     turning_height : Float or None, m
         Least height at which the ray turned from falling to rising; NaN where it never did. None unless
         details were asked for.
+    error : Float or None, rad
+        Sum of the estimated errors of the steps, as a displacement seen from the origin. None for fixed
+        steps and panes.
+    queries : UInt32 or None
+        Straight pieces that were tested against the surface.
+    mark : object or None
+        What the surface says of the hit, where it says more than its distance.
     """
 
     status: Any
@@ -91,6 +98,9 @@ class RayEnd:
     path_length: Any
     optical_path: Any = None
     turning_height: Any = None
+    error: Any = None
+    queries: Any = None
+    mark: Any = None
 
     @property
     def hit(self) -> Any:

@@ -90,7 +90,7 @@ def cross_layers(
         steps=UInt32(0),
         free=Bool(False),
     )
-    chord = Chord.along(origin, d, Float(0), Float(0))
+    chord = Chord.along(origin, d, Float(0), Float(0), blank=getattr(surface, "blank", None))
     flying = active & (max_crossings > 0)
     ray, chord = _cross_all(layers, surface, start, chord, max_crossings, limit, flying)
 
@@ -106,6 +106,8 @@ def cross_layers(
         chord_length=chord.length,
         chord_start=chord.start,
         steps=ray.steps,
+        queries=ray.steps + 1,
+        mark=chord.mark,
         path_length=ray.path,
         optical_path=ray.optical if details else None,
         turning_height=turning if details else None,
@@ -228,6 +230,8 @@ def straight(
         chord_length=chord.length,
         chord_start=chord.start,
         steps=types.UInt32(0),
+        queries=types.UInt32(1),
+        mark=chord.mark,
         path_length=path,
         optical_path=path if details else None,
         turning_height=Float(dr.nan) if details else None,

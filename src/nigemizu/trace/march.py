@@ -2,57 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any, Final, final
+from dataclasses import replace
+from typing import Any
 
 import drjit as dr
 
 from nigemizu.field import Field
+from nigemizu.errors import InputError
 from nigemizu.trace.chords import Chord
+from nigemizu.trace.controlled import FIRST_TRIAL, ControlledSteps
 from nigemizu.trace.ends import RayEnd, choose_status
 from nigemizu.trace.steppers import LEAPFROG, Stepper
+from nigemizu.trace.stepping import FixedSteps, Flight, StepRule
 from nigemizu.trace.surfaces import Surface
 
-__all__ = ["march"]
-
-_ROUNDING: Final = {"single": 4 * 2.0**-23, "double": 4 * 2.0**-52}
-NEAREST: Final = 1.0  # m; nearer to the eye than this the chord tolerance grows no finer
-
-
-@final
-@dataclass
-class _Flight:
-    """What the marching loop carries from step to step, one entry per ray."""
-
-    position: Any  #     Array3f  m    x
-    momentum: Any  #     Array3f  1    p, |p| = n
-    path: Any  #         Float    m    ∫ ds so far
-    optical: Any  #      Float    m    ∫ n ds so far
-    turning: Any  #      Float    m    least height of an upward turn; infinite before the first
-    steps: Any  #        UInt32   1    steps made
-    inside: Any  #       Bool          still in the volume
-    chord_steps: Any  #  UInt32   1    steps since the chord began
-    chord_turn: Any  #   Float    rad  bound of the angle turned since the chord began
-    last_turn: Any  #    Float    rad  the same of the last step alone
-
-    def at_new_chord(self) -> _Flight:
-        """The same ray, about to begin a chord."""
-        return replace(self, chord_steps=self.chord_steps * 0, chord_turn=self.chord_turn * 0)
-
+__all__ = ["march", "run"]
 
 def march(
     field: Field,
     origin: Any,
     direction: Any,
     *,
-    step: Any,
+    accuracy: Any = None,
+    step: Any = None,
     max_steps: Any,
     stepper: Stepper = LEAPFROG,
     surface: Surface | None = None,
     chord_tolerance: Any = None,
     max_chord_steps: int = 32,
+    travelled: Any = 0.0,
     max_distance: Any = None,
+    cellwise: bool = True,
     details: bool = False,
+    bends: Any = True,
     active: Any = True,
 ) -> RayEnd:
     """March rays through a field.
@@ -62,12 +44,16 @@ def march(
     field : Field
     origin : Array3f, m
     direction : Array3f, 1 — unit length
+    accuracy : float or Float, rad
+        Displacement, seen from the ray's origin, that the integration may add: steps are controlled by
+        their estimated error.
     step : float or Float, m
-        Interval along the ray between turns. It is exact where the index is that at the ray's first
-        point in the volume, and n/n₀ times as long elsewhere.
+        In place of the accuracy, the paper's fixed interval along the ray between turns. It is exact where
+        the index is that at the ray's first point in the volume, and n/n₀ times as long elsewhere.
     max_steps : int or UInt32
         Most intervals that a ray may use.
     stepper : Stepper
+        Rule of fixed intervals.
     surface : callable, optional
         ``surface(origin, direction, length, active) -> (hit, distance)``.
     chord_tolerance : float or Float, optional, rad
@@ -75,16 +61,27 @@ def march(
         fraction of a pixel). None tests after every step.
     max_chord_steps : int
         Most steps that share a chord.
+    travelled : Float, m
+        Path length that lies behind the origin already; all path lengths count from its beginning.
     max_distance : Float, optional, m
         Path length at which a ray stops; the last step is shortened to it.
+    cellwise : bool
+        Whether controlled steps end at the faces of cells (`ControlledSteps`).
     details : bool
         Also sum the optical path and look for turning points.
+    bends : Bool
+        Rays that the field bends; the others go straight for ever.
     active : Bool
         Rays that take part.
 
     Returns
     -------
     RayEnd
+
+    Raises
+    ------
+    InputError
+        Unless exactly one of `accuracy` and `step` is given.
 
     Notes
     -----
@@ -98,10 +95,12 @@ def march(
     with the next step taken to be like the last, stays under `chord_tolerance` times the distance
     travelled (at least 1 m).
 
-    The call may be nested in a symbolic loop. The step in which a ray leaves the volume is bent wholly
-    or not at all: a first-order error, but only of that one step.
+    The call may be nested in a symbolic loop. A fixed step in which a ray leaves the volume is bent wholly
+    or not at all: a first-order error, but only of that one step. Controlled steps (`ControlledSteps`)
+    end at the face.
 
-    Limits: light is geometric; steps must be short against the length over which the gradient changes.
+    Limits: light is geometric; fixed steps must be short against the length over which the gradient
+    changes. The estimates of controlled steps are local: what is amplified later on the way counts once.
 
     References
     ----------
@@ -116,62 +115,54 @@ def march(
     >>> types = field.types("llvm", "double")
     >>> air = field.ExponentialSquare(types, a=1.00027**2, amplitude=5e-5, height=0.05)
     >>> eye, ahead = types.Array3f(0, 0, 1.5), types.Array3f(1, 0, -0.002)
-    >>> end = trace.march(air, eye, ahead, step=0.1, max_steps=10_000, details=True)
+    >>> end = trace.march(air, eye, ahead, accuracy=1e-7, max_steps=1000, details=True)
     >>> round(float(end.turning_height[0]), 3)
     0.126
     """
     types = field.types
     Float, Array3f, UInt32, Bool = types.Float, types.Array3f, types.UInt32, types.Bool
+    if (accuracy is None) == (step is None):
+        raise InputError("give the accuracy of the rays or a fixed step, one of them", key="accuracy")
     origin, d, active = Array3f(origin), Array3f(direction), Bool(active)
     limit = Float(dr.inf if max_distance is None else max_distance)
 
     # ---- straight to the volume
-    entry = field.entry(origin, d)
-    chord = Chord.along(origin, d, dr.minimum(entry, limit), Float(0))
-    if surface is not None:
-        chord = chord.test(surface, active & (entry > 0))
-    enters = active & ~chord.found & (entry < limit)
+    before = Float(travelled)
+    entry = dr.select(Bool(bends), field.entry(origin, d), dr.inf)
+    enters = active & (entry < limit - before)
     start = dr.select(enters, entry, 0)
 
     # ---- bent inside
     x = Array3f(dr.fma(d, start, origin))
-    n, _ = field.value_and_gradient(x, active)
-    flight = _Flight(
-        position=x,
-        momentum=Array3f(d * n),
-        path=Float(start),
-        optical=Float(start * n),
-        turning=Float(dr.inf),
-        steps=UInt32(0),
-        inside=Bool(enters),
-        chord_steps=UInt32(0),
-        chord_turn=Float(0),
-        last_turn=Float(0),
-    )
-    march_step = _MarchStep(
-        field=field,
-        stepper=stepper,
-        sigma=Float(step) / n,
-        step=Float(step),
-        max_steps=UInt32(max_steps),
-        limit=None if max_distance is None else limit,
-        tolerance=None if chord_tolerance is None else Float(chord_tolerance),
-        max_chord_steps=max_chord_steps if chord_tolerance is not None else 1,
-        details=details,
-    )
-    if surface is None:
-        flight = _run(march_step, flight, enters)
+    flight = Flight.begin(field, x, d, before + start, enters, FIRST_TRIAL)
+    options = {
+        "max_steps": UInt32(max_steps),
+        "limit": None if max_distance is None else limit,
+        "chord_tolerance": None if chord_tolerance is None or surface is None else Float(chord_tolerance),
+        "max_chord_steps": max_chord_steps,
+        "details": details,
+    }
+    rule: StepRule
+    if step is None:
+        rule = ControlledSteps(field, accuracy=Float(accuracy), cellwise=cellwise, **options)
     else:
-        flight, chord = _run_chords(march_step, surface, flight, chord, enters)
+        sigma = Float(step) / dr.norm(flight.momentum)
+        rule = FixedSteps(field, stepper=stepper, step=Float(step), sigma=sigma, **options)
+    queries = UInt32(0)
+    chord = Chord.along(origin, d, Float(0), before, blank=getattr(surface, "blank", None))
+    if surface is None:
+        flight = run(rule, flight, enters)
+    else:
+        approach = Chord.along(origin, d, dr.minimum(entry, limit - before), before)
+        flight, chord, queries = _run_chords(
+            rule, surface, flight, chord, queries, active, active & (entry > 0), approach, limit
+        )
 
     # ---- straight on after it has left
     ahead = dr.normalize(flight.momentum)
     n = dr.norm(flight.momentum)
     gone = active & ~chord.found & ~flight.inside  # has left, or never met the volume
     flight = _back_to_face(field, flight, ahead, n, gone & enters)
-    if surface is not None:
-        beyond = Chord.along(flight.position, ahead, limit - flight.path, flight.path)
-        chord = chord.replaced(beyond.test(surface, gone & enters), gone & enters)
     hit, t = chord.found, chord.distance
     path = dr.select(hit, chord.start + t, dr.select(gone & (limit < dr.inf), limit, flight.path))
     turning = dr.select(flight.turning < dr.inf, flight.turning, dr.nan)
@@ -181,7 +172,7 @@ def march(
             active=active,
             hit=hit,
             escaped=gone & (limit == dr.inf),
-            stopped=gone | march_step.at_limit(flight),
+            stopped=gone | rule.at_limit(flight),
         ),
         position=dr.select(hit, chord.at(t), dr.fma(ahead, path - flight.path, flight.position)),
         direction=ahead,
@@ -193,121 +184,61 @@ def march(
         path_length=path,
         optical_path=dr.fma(n, path - flight.path, flight.optical) if details else None,
         turning_height=turning if details else None,
+        error=flight.error if step is None else None,
+        queries=queries,
+        mark=chord.mark,
     )
 
 
-class _MarchStep:
-    """One interval of the march and the conditions under which the next one follows."""
-
-    def __init__(
-        self,
-        *,
-        field: Field,
-        stepper: Stepper,
-        sigma: Any,
-        step: Any,
-        max_steps: Any,
-        limit: Any,
-        tolerance: Any,
-        max_chord_steps: int,
-        details: bool,
-    ) -> None:
-        self.field = field
-        self.stepper = stepper
-        self.sigma = sigma
-        self.step = step
-        self.max_steps = max_steps
-        self.limit = limit
-        self.tolerance = tolerance
-        self.max_chord_steps = max_chord_steps
-        self.details = details
-
-    def advance(self, flight: _Flight, active: Any) -> _Flight:
-        """The state after one more interval."""
-        sigma = self.sigma
-        if self.limit is not None:
-            sigma = sigma * dr.minimum(1, (self.limit - flight.path) * dr.rcp(self.step))
-        after = self.stepper.advance(self.field, flight.position, flight.momentum, sigma, active)
-        turning = flight.turning
-        if self.details:
-            turning = dr.minimum(turning, _turn(flight, after.momentum, sigma))
-        return _Flight(
-            position=after.position,
-            momentum=after.momentum,
-            path=flight.path + after.length,
-            optical=flight.optical + after.optical_path,
-            turning=turning,
-            steps=flight.steps + 1,
-            inside=self.field.contains(after.position),
-            chord_steps=flight.chord_steps + 1,
-            chord_turn=flight.chord_turn + after.turned,
-            last_turn=after.turned,
-        )
-
-    def flying(self, flight: _Flight) -> Any:
-        """Whether the ray has anywhere to go and steps left to go there."""
-        flying = flight.inside & (flight.steps < self.max_steps)
-        return flying if self.limit is None else flying & ~self.at_limit(flight)
-
-    def at_limit(self, flight: _Flight) -> Any:
-        """Whether the ray has gone the whole distance that was asked for."""
-        types = self.field.types
-        if self.limit is None:
-            return types.Bool(False)
-        return flight.path >= self.limit * (1 - _ROUNDING[types.precision])
-
-    def chord_holds(self, flight: _Flight, chord_start: Any) -> Any:
-        """Whether one more step like the last one may share the chord that began at `chord_start`."""
-        holds = flight.chord_steps < self.max_chord_steps
-        if self.tolerance is not None:
-            length = flight.path - chord_start + self.step
-            strays = length * (flight.chord_turn + flight.last_turn) * 0.25
-            holds &= strays <= self.tolerance * dr.maximum(flight.path, NEAREST)
-        return holds
-
-
 @dr.syntax
-def _run(march_step: _MarchStep, flight: _Flight, flying: Any) -> _Flight:
+def run(rule: StepRule, flight: Flight, flying: Any) -> Flight:
     """March without testing anything."""
     while dr.hint(flying, label="march"):
-        flight = march_step.advance(flight, flying)
-        flying = march_step.flying(flight)
+        flight = rule.advance(flight, flying)
+        flying = rule.flying(flight)
     return flight
 
 
 @dr.syntax
-def _run_chord(march_step: _MarchStep, flight: _Flight, flying: Any, chord_start: Any) -> _Flight:
+def _run_chord(rule: StepRule, flight: Flight, flying: Any) -> Flight:
     """March as far as one chord may span."""
     while dr.hint(flying, label="march one chord"):
-        flight = march_step.advance(flight, flying)
-        flying = march_step.flying(flight) & march_step.chord_holds(flight, chord_start)
+        flight = rule.advance(flight, flying)
+        flying = rule.flying(flight) & rule.chord_holds(flight)
     return flight
 
 
 @dr.syntax
 def _run_chords(
-    march_step: _MarchStep, surface: Surface, flight: _Flight, chord: Chord, flying: Any
-) -> tuple[_Flight, Chord]:
-    """March chord after chord, each tested against the surface, until all rays have ended."""
+    rule: StepRule,
+    surface: Surface,
+    flight: Flight,
+    chord: Chord,
+    queries: Any,
+    flying: Any,
+    waiting: Any,
+    approach: Chord,
+    limit: Any,
+) -> tuple[Flight, Chord, Any]:
+    """Piece after piece, each tested against the surface: the approach of rays that wait outside, chords
+    within the volume, and the way on from where a ray has left it."""
     while dr.hint(flying, label="march chords"):
-        begin = flight.position
-        chord_start = flight.path
-        flight = _run_chord(march_step, flight.at_new_chord(), flying, chord_start)
-        piece = Chord.between(begin, flight.position, chord_start).test(surface, flying)
+        begin, chord_start, marches = flight.position, flight.path, flying & ~waiting & flight.inside
+        flight = _run_chord(rule, flight.at_new_chord(), marches)
+        piece = Chord.between(begin, flight.position, chord_start)
+        onward = Chord.along(begin, dr.normalize(flight.momentum), limit - chord_start, chord_start)
+        piece = approach.replaced(onward.replaced(piece, marches), ~waiting).test(surface, flying)
+        queries += 1
         chord = chord.replaced(piece, flying)
-        flying = flying & ~chord.found & march_step.flying(flight)
-    return flight, chord
+        # After the approach come the rays that enter, and after the last chord those that have left.
+        leaves = ~flight.inside & (flight.path < limit)
+        goes_on = dr.select(waiting, flight.inside, marches & (rule.flying(flight) | leaves))
+        flying = flying & ~chord.found & goes_on
+        waiting = waiting & ~flying
+    return flight, chord, queries
 
 
-def _turn(flight: _Flight, momentum: Any, sigma: Any) -> Any:
-    """Height of an upward turn within a step: p_z taken as linear in σ; infinite if there is none."""
-    falling, rising = flight.momentum.z, momentum.z
-    turns = (falling < 0) & (rising >= 0)
-    drop = 0.5 * sigma * falling * falling / dr.select(turns, rising - falling, 1)
-    return dr.select(turns, flight.position.z - drop, dr.inf)
-
-
-def _back_to_face(field: Field, flight: _Flight, ahead: Any, n: Any, left: Any) -> _Flight:
+def _back_to_face(field: Field, flight: Flight, ahead: Any, n: Any, left: Any) -> Flight:
     """Take rays that have left back along their straight line to the face that they crossed."""
     back = field.entry(flight.position, -ahead)
     # A line that leaves by an edge may miss the box when followed back.

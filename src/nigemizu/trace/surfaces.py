@@ -9,9 +9,11 @@ import drjit as dr
 
 __all__ = ["Surface", "combine", "ground_plane"]
 
-Surface: TypeAlias = Callable[[Any, Any, Any, Any], tuple[Any, Any]]
+Surface: TypeAlias = Callable[[Any, Any, Any, Any], tuple[Any, ...]]
 """``surface(origin, direction, length, active) -> (hit, distance)``: whether and where (m from the origin,
-along the unit direction, at most `length`) a straight piece meets a surface."""
+along the unit direction, at most `length`) a straight piece meets a surface. A surface may return a third
+value, a mark of what was met, which ends up in `RayEnd.mark`; its attribute ``blank`` is then the mark of
+nothing."""
 
 
 def ground_plane(height: float = 0.0) -> Surface:
@@ -30,8 +32,8 @@ def combine(first: Surface, second: Surface) -> Surface:
     """Both surfaces at once: the nearer hit counts."""
 
     def surface(origin: Any, direction: Any, length: Any, active: Any) -> tuple[Any, Any]:
-        hit_1, distance_1 = first(origin, direction, length, active)
-        hit_2, distance_2 = second(origin, direction, length, active)
+        hit_1, distance_1, *_ = first(origin, direction, length, active)
+        hit_2, distance_2, *_ = second(origin, direction, length, active)
         distance = dr.minimum(dr.select(hit_1, distance_1, dr.inf), dr.select(hit_2, distance_2, dr.inf))
         return hit_1 | hit_2, distance
 

@@ -1,0 +1,77 @@
+"""Speed of the heat stage beside that of copying memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nigemizu.cli.bench.timing import SELDOM, alternate
+from nigemizu.progress import SILENT, ProgressMeter
+
+__all__ = ["BYTES_PER_UPDATE", "copying", "hot_ground_in_wind", "measure_heat"]
+
+BYTES_PER_UPDATE = 16
+"""One update reads and writes the temperature of a cell, in double precision, once at the very least."""
+
+
+def hot_ground_in_wind() -> dict[str, Any]:
+    """Ground, diffusivity and wind that set every part of the heat stage to work, for `heat.evolve`."""
+    from nigemizu.heat import Diffusivity, HeldGround, Wind
+
+    return {
+        "ground": HeldGround.model_validate({"temperature": 330.0}),
+        "diffusivity": Diffusivity(kind="eddy", friction_velocity=0.1, cap_height=1.0),
+        "wind": Wind(speed=2.0, direction=30.0, shear="log"),
+    }
+
+
+def copying(source: NDArray[Any]) -> Callable[[], object]:
+    """The work of copying an array into one that is there already."""
+    target = np.empty_like(source)
+    return lambda: np.copyto(target, source)
+
+
+def measure_heat(
+    cells: tuple[int, int, int] = (256, 128, 96), steps: int = 4, *, progress: ProgressMeter = SILENT
+) -> dict[str, Any]:
+    """Cell-updates per second in a stretched grid with wind and eddy diffusivity.
+
+    Parameters
+    ----------
+    cells : (int, int, int)
+        Number of cells along x, y and z.
+    steps : int
+        Steps that are timed at once.
+    progress : ProgressMeter
+
+    Returns
+    -------
+    dict
+        ``cell_updates_per_second`` [1/s], ``memory_copy_bytes_per_second`` [1/s] read and written, and
+        ``share_of_memory_copy`` [1]: the least bytes that an update must move over what a copy of the same
+        volume moves in the same time.
+    """
+    from nigemizu.heat import GridSpec, evolve
+
+    grid = GridSpec(x=(0.0, 64.0), y=(0.0, 32.0), height=4.0, cells=cells, first_cell=0.002).build()
+    # noise: equal values would be one page of the system's memory, read over and over
+    temperature = np.random.default_rng(0).normal(300.0, 0.1, grid.shape)
+    setting = hot_ground_in_wind()
+
+    def heat() -> None:
+        for _ in evolve(grid, temperature, times=[0.1 * steps], time_step=0.1, **setting):
+            pass
+
+    works = {"heat": heat, "copy": copying(temperature)}
+    seconds = alternate(works, SELDOM, label="heat", progress=progress)
+    updates = temperature.size * steps / seconds["heat"]
+    copied = 2 * temperature.nbytes / seconds["copy"]
+    return {
+        "cells": list(cells),
+        "cell_updates_per_second": updates,
+        "memory_copy_bytes_per_second": copied,
+        "share_of_memory_copy": updates * BYTES_PER_UPDATE / copied,
+    }

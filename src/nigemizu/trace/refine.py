@@ -1,0 +1,340 @@
+"""Paths on a screen grid that is as fine as the air demands: what the rays between them share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final, final
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from nigemizu.field import Field
+from nigemizu.trace.scout import BLOCK, Segments
+from nigemizu.trace.stations import Stations, fly
+from nigemizu.trace.view import View, types_of
+
+__all__ = ["RECORD", "PathTable", "refine"]
+
+FloatArray = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
+
+RECORD: Final = 8  # numbers per state: offset, 0, deflection, 0
+_FEWEST: Final = (2, 2)  # cells of a block, across and down, between the nodes whose rays are flown
+_MOST: Final = (16, 64)
+_FINEST: Final = (32, 128)  # the same of the table, which is linear in between
+_LOCAL: Final = 4  # degree of the polynomials that lead from one to the other
+_GAIN: Final = 0.25  # of what the coarser grid misses, that the finer one may miss
+_POLYNOMIAL, _LINEAR = 0.3, 0.2  # of the accuracy, for each of the two and each direction
+
+
+@final
+@dataclass(frozen=True)
+class PathTable:
+    """States of the paths at the nodes of each block; B blocks.
+
+    Attributes
+    ----------
+    records : (K * RECORD,) float
+        Offset from the straight ray [m] and deflection of the direction [1] at the beginning of each
+        segment and behind the last one, in the view's frame.
+    base : (B,) uint32
+        Index of a block's first record: ``base + (segment * rows + row) * columns + column``, each one
+        more than the cells.
+    cells : (B, 2) uint32
+        Cells of its grid across and down; 0 where the paths are not smooth and each ray must be marched.
+    error : (B,) float64, rad
+        Estimated displacement that the sharing adds.
+    steps : float
+        Mean steps of the paths flown.
+    flown : int
+        Paths flown for the table.
+    """
+
+    records: Array
+    base: NDArray[np.uint32]
+    cells: NDArray[np.uint32]
+    error: FloatArray
+    steps: float
+    flown: int
+
+
+def refine(
+    field: Field, view: View, segments: Segments, *, accuracy: float, integration: float, max_steps: int
+) -> PathTable:
+    """Fly the rays of the nodes, on finer and finer grids where the interpolation is not good enough.
+
+    Parameters
+    ----------
+    field, view, segments
+        As for, and from, `scout`.
+    accuracy : float, rad
+        Displacement that sharing may add.
+    integration : float, rad
+        Accuracy of the nodes' paths.
+    max_steps : int
+
+    Notes
+    -----
+    Across and down by themselves: the nodes that the next coarser grid lacks are compared with the
+    polynomial of degree 1, 2 or 4 through the coarser one's. A quarter of the difference is taken as the
+    error of the polynomial through all of them (Lagrange's, of degree 2 or 4). Where it is too large the
+    cells are halved; else the table's own grid is filled from the polynomials, so finely that between its
+    nodes it may be linear. A block whose finest grid does not suffice, or which has a ray that runs out of
+    steps, is not shared.
+    """
+    table = _Table(len(segments.count))
+    flown, steps = 0, 0.0
+    all_ = np.flatnonzero(~segments.lost)
+    waiting = [_Open(_FEWEST, all_, None, (1, 1))] if len(all_) else []
+    while waiting:
+        round_ = _fly_nodes(field, view, segments, waiting, integration, max_steps)
+        flown += round_.rays
+        steps += round_.steps
+        next_: dict[tuple[Any, Any], list[_Open]] = {}
+        for part, states, lost in zip(waiting, round_.states, round_.lost, strict=True):
+            blocks = part.blocks
+            wrong = [_GAIN * _displacement(*_against_coarser(states, axis), segments, blocks) for axis in (0, 1)]
+            coarse = [(w > _POLYNOMIAL * accuracy) & ~lost for w in wrong]
+            good = np.flatnonzero(~coarse[0] & ~coarse[1] & ~lost)
+            table.put(states[..., good], segments, blocks[good], (wrong[0] + wrong[1])[good], _LINEAR * accuracy)
+            for finer, factors, members in _doubled(part.grid, coarse):
+                opened = _Open(finer, blocks[members], states[..., members], factors)
+                next_.setdefault((finer, factors), []).append(opened)
+        waiting = [_merged(parts) for parts in next_.values()]
+    return table.frozen(steps, flown)
+
+
+@final
+@dataclass(frozen=True)
+class _Open:
+    """Blocks that need a finer grid, the states of the coarser one (None at first), and how many times finer."""
+
+    grid: tuple[int, int]
+    blocks: NDArray[np.intp]
+    states: Array | None
+    factors: tuple[int, int]
+
+
+def _merged(parts: list[_Open]) -> _Open:
+    """Blocks that need the same grid, as one."""
+    states = np.concatenate([part.states for part in parts if part.states is not None], axis=-1)
+    return _Open(parts[0].grid, np.concatenate([part.blocks for part in parts]), states, parts[0].factors)
+
+
+def _doubled(
+    grid: tuple[int, int], coarse: list[NDArray[np.bool_]]
+) -> Iterator[tuple[tuple[int, int], tuple[int, int], NDArray[np.intp]]]:
+    """The next finer grids, the factors, and the members that are too coarse across, down, or both."""
+    for factors in ((2, 1), (1, 2), (2, 2)):
+        finer = (grid[0] * factors[0], grid[1] * factors[1])
+        members = np.flatnonzero((coarse[0] == (factors[0] > 1)) & (coarse[1] == (factors[1] > 1)))
+        if finer[0] <= _MOST[0] and finer[1] <= _MOST[1] and len(members):
+            yield finer, factors, members
+
+
+class _Table:
+    """The table while it is being filled; arguments and results as in `PathTable`."""
+
+    def __init__(self, blocks: int) -> None:
+        self.cells = np.zeros((blocks, 2), dtype=np.uint32)
+        self.base = np.zeros(blocks, dtype=np.uint32)
+        self.error = np.zeros(blocks)
+        self.kept: list[Array] = []
+        self.size = 0
+
+    def put(
+        self, states: Array, segments: Segments, blocks: NDArray[np.intp], wrong: FloatArray, accuracy: float
+    ) -> None:
+        """Fill the grids of some blocks, each as finely as it takes for the table to be linear in between.
+
+        Between nodes at the distance h linear interpolation misses h² |f″|/8, an eighth of the second
+        difference; with h it falls to a quarter for each halving.
+        """
+        if not len(blocks):
+            return
+        grid = (states.shape[1] - 1, states.shape[0] - 1)
+        cells, missed = [], []
+        for axis, most in enumerate(_FINEST):
+            ahead, behind, middle = _moved(states, axis, 2), _moved(states, axis, 0), _moved(states, axis, 1)
+            second = _displacement(0.5 * (ahead + behind), middle, segments, blocks) / 4
+            halvings = np.ceil(np.log2(np.maximum(second / accuracy, 1e-9)) / 2).astype(int)
+            wanted = np.clip(grid[axis] * 2.0**halvings, _FEWEST[axis], most).astype(int)
+            cells.append(wanted)
+            missed.append(second * (grid[axis] / wanted) ** 2)
+        error = wrong + missed[0] + missed[1]
+        code = cells[0] * 1024 + cells[1]
+        for value in np.unique(code):
+            members = np.flatnonzero(code == value)
+            pair = divmod(int(value), 1024)
+            weights = [_lagrange(n, min(n, _LOCAL), np.linspace(0, 1, c + 1)) for n, c in zip(grid, pair, strict=True)]
+            self._keep(_spread(states[..., members], *weights), blocks[members], pair, error[members])
+
+    def _keep(self, states: Array, blocks: NDArray[np.intp], cells: tuple[int, int], error: FloatArray) -> None:
+        rows, columns, stops, _, count = states.shape
+        records = np.zeros((count, stops, rows, columns, RECORD), dtype=states.dtype)
+        ordered = states.transpose(4, 2, 0, 1, 3)
+        records[..., :3], records[..., 4:7] = ordered[..., :3], ordered[..., 3:]
+        per_block = stops * rows * columns
+        self.base[blocks] = self.size + per_block * np.arange(len(blocks))
+        self.cells[blocks] = cells
+        self.error[blocks] = error
+        self.kept.append(records.ravel())
+        self.size += per_block * len(blocks)
+
+    def frozen(self, steps: float, flown: int) -> PathTable:
+        records = np.concatenate(self.kept) if self.kept else np.zeros(RECORD, dtype=np.float32)
+        return PathTable(records, self.base, self.cells, self.error, steps / max(flown, 1), flown)
+
+
+@final
+@dataclass(frozen=True)
+class _Round:
+    """What one launch brought: per part the states (rows, columns, stops, 6, blocks) and which blocks lost a ray."""
+
+    states: list[Array]
+    lost: list[NDArray[np.bool_]]
+    steps: float
+    rays: int
+
+
+def _fly_nodes(
+    field: Field, view: View, segments: Segments, parts: list[_Open], accuracy: float, max_steps: int
+) -> _Round:
+    """Fly the nodes that the coarser grids lack, those of all parts together."""
+    stops = segments.start.shape[1] + 1
+    fresh = [_fresh(part) for part in parts]
+    places = [_places(segments, part, mask) for part, mask in zip(parts, fresh, strict=True)]
+    x, y = (np.concatenate([place[i] for place in places]) for i in (0, 1))
+    flown, lost_rays, steps = _fly(field, view, x, y, np.concatenate([p[2] for p in places], axis=1), accuracy, max_steps)
+    states, lost, at = [], [], 0
+    for part, mask in zip(parts, fresh, strict=True):
+        blocks, nodes = len(part.blocks), int(mask.sum())
+        rays = slice(at, at + nodes * blocks)
+        at += nodes * blocks
+        filled = np.empty((*mask.shape, stops, 6, blocks), dtype=flown.dtype)
+        # (6, stop, node, block) → (node, stop, 6, block)
+        filled[mask] = flown[..., rays].reshape(6, stops, nodes, blocks).transpose(2, 1, 0, 3)
+        if part.states is not None:
+            filled[_known(part)] = part.states
+        states.append(filled)
+        lost.append(lost_rays[rays].reshape(nodes, blocks).any(axis=0))
+    return _Round(states, lost, steps, at)
+
+
+def _known(part: _Open) -> tuple[slice, slice]:
+    return slice(None, None, part.factors[1]), slice(None, None, part.factors[0])
+
+
+def _fresh(part: _Open) -> NDArray[np.bool_]:
+    """Which nodes (rows, columns) of a part's grid have not been flown yet."""
+    fresh = np.ones((part.grid[1] + 1, part.grid[0] + 1), dtype=bool)
+    if part.states is not None:
+        fresh[_known(part)] = False
+    return fresh
+
+
+def _places(segments: Segments, part: _Open, fresh: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Place of each ray (nodes · blocks) in pixels, and its path lengths (stops, nodes · blocks)."""
+    blocks = part.blocks
+    row, column = np.nonzero(fresh)
+    down, across = (row / part.grid[1])[:, None], (column / part.grid[0])[:, None]
+    corner = segments.start[blocks].T[..., None, :]  # (corner, segment, 1, block)
+    upper, lower = (corner[i] + (corner[i + 1] - corner[i]) * across for i in (0, 2))
+    lengths = np.empty((corner.shape[1] + 1, len(row), len(blocks)))
+    lengths[:-1] = upper + (lower - upper) * down
+    lengths[-1] = segments.last[blocks]
+    y, x = np.divmod(blocks, segments.columns)
+    return ((x + across) * BLOCK[0]).ravel(), ((y + down) * BLOCK[1]).ravel(), lengths.reshape(len(lengths), -1)
+
+
+def _fly(
+    field: Field, view: View, x: FloatArray, y: FloatArray, lengths: FloatArray, accuracy: float, max_steps: int
+) -> tuple[Array, NDArray[np.bool_], float]:
+    """States (6, stops, rays) as offsets from the straight rays [m] and deflections [1], in the view's frame;
+    which rays were lost, and the steps of all together."""
+    types = field.types
+    Float, UInt32 = types.Float, types.UInt32
+    stops, rays = lengths.shape
+    direction = types_of(types, view.directions(x, y))
+    eye = types.Array3f(*(dr.opaque(Float, float(place)) for place in view.eye))
+    lane, stride = dr.arange(UInt32, rays), dr.opaque(UInt32, rays)
+    lengths = Float(np.ascontiguousarray(lengths).ravel())
+    records = fly(
+        field,
+        eye,
+        direction,
+        accuracy=dr.opaque(Float, accuracy),
+        max_steps=dr.opaque(UInt32, max_steps),
+        stations=Stations(lengths, lane, stride, dr.opaque(UInt32, stops), lane, stride),
+        size=rays * stops,
+    )
+    dr.eval(records.position, records.direction)
+    d = dr.gather(types.Array3f, direction, dr.arange(UInt32, rays * stops) % stride)
+    offset = view.to_frame(d, types.Array3f(*records.position) - eye - d * lengths)
+    deflection = view.to_frame(d, types.Array3f(*records.direction) - d)
+    dr.eval(offset, deflection)
+    states = np.stack([np.asarray(part) for part in (*offset, *deflection)]).reshape(6, stops, rays)
+    lost = np.asarray(records.lost).reshape(stops, rays)[-1] > 0
+    return states, lost, float(np.asarray(records.steps).reshape(stops, rays)[-1].sum(dtype=np.float64))
+
+
+def _lagrange(grid: int, degree: int, places: FloatArray) -> FloatArray:
+    """Weights (places, grid + 1) of equally spaced nodes on [0, 1], for polynomials on pieces of `degree` cells."""
+    weights = np.zeros((len(places), grid + 1))
+    pieces = grid // degree
+    piece = np.minimum((places * pieces).astype(int), pieces - 1)
+    t = places * grid - piece * degree
+    for i in range(degree + 1):
+        others = [j for j in range(degree + 1) if j != i]
+        weight = np.prod([(t - j) / (i - j) for j in others], axis=0)
+        weights[np.arange(len(places)), piece * degree + i] = weight
+    return weights
+
+
+def _spread(states: Array, across: FloatArray, down: FloatArray) -> Array:
+    """States on another grid: the weights applied across and down."""
+    return _weighted(_weighted(states.swapaxes(0, 1), across).swapaxes(0, 1), down)
+
+
+def _weighted(states: Array, weights: FloatArray) -> Array:
+    """Sums over the first axis. Not by BLAS, whose threads get into the way of those of the rays."""
+    result = np.empty((len(weights), *states.shape[1:]), dtype=states.dtype)
+    for row, weight in zip(result, weights.astype(states.dtype), strict=True):
+        first, *others = np.flatnonzero(weight)
+        np.multiply(states[first], weight[first], out=row)
+        for other in others:
+            row += states[other] * weight[other]
+    return result
+
+
+def _moved(states: Array, axis: int, start: int) -> Array:
+    """All but two of the nodes across (0) or down (1), from `start` on."""
+    count = states.shape[1 - axis] - 2
+    return states[:, start : start + count] if axis == 0 else states[start : start + count]
+
+
+def _against_coarser(states: Array, axis: int) -> tuple[Array, Array]:
+    """Every second state across (0) or down (1), and what polynomials through the others give there."""
+    if axis == 0:
+        states = states.swapaxes(0, 1)
+    grid = len(states) - 1
+    weights = _lagrange(grid // 2, min(grid // 2, _LOCAL), np.linspace(0, 1, grid + 1)[1::2])
+    return states[1::2], _weighted(states[::2], weights)
+
+
+def _displacement(states: Array, others: Array, segments: Segments, blocks: NDArray[np.intp]) -> FloatArray:
+    """Largest displacement [rad], per block, between states (rows, columns, stops, 6, blocks)."""
+    squares = np.square(states - others)
+    offset, deflection = (
+        np.sqrt((squares[:, :, :, i] + squares[:, :, :, i + 1] + squares[:, :, :, i + 2]).max(axis=(0, 1)))
+        for i in (0, 3)
+    )
+    displaced = np.maximum(offset[-1] / np.maximum(segments.last[blocks], 1.0), deflection[-1])
+    # On to the end of each segment; what is seen there is as far away as it is long.
+    start = segments.start[blocks].min(axis=2).T
+    end = np.maximum(segments.end[blocks], 1.0).T
+    there = (offset[:-1] + deflection[:-1] * np.maximum(end - start, 0)) / end
+    there[np.arange(len(there))[:, None] >= segments.count[blocks]] = 0
+    return np.maximum(displaced, there.max(axis=0)).astype(np.float64)

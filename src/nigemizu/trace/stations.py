@@ -1,0 +1,136 @@
+"""Flying rays from station to station: their state at given path lengths, in one launch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, final
+
+import drjit as dr
+
+from nigemizu.field import Field
+from nigemizu.trace.controlled import FIRST_TRIAL, ControlledSteps
+from nigemizu.trace.march import run
+from nigemizu.trace.stepping import Flight
+
+__all__ = ["Stations", "fly"]
+
+
+@final
+@dataclass(frozen=True)
+class Stations:
+    """Where rays are looked at, and where what is seen is written; one entry per ray but for `lengths`.
+
+    Attributes
+    ----------
+    lengths : Float, m
+        Path lengths, increasing for each ray.
+    first, step : UInt32
+        The k-th of the ray stands at index ``first + k * step``.
+    count : UInt32
+        How many it has.
+    target, stride : UInt32
+        The k-th state of the ray is written at index ``target + k * stride``.
+    """
+
+    lengths: Any
+    first: Any
+    step: Any
+    count: Any
+    target: Any
+    stride: Any
+
+
+@final
+@dataclass
+class _Records:
+    """States at the stations, flat arrays of the field's Float (UInt32 for `lost`)."""
+
+    position: Any  #   3 × Float  m
+    direction: Any  #  3 × Float  1
+    stray: Any  #      Float      m   bound of how far the path strays from the chord since the station before
+    outside: Any  #    UInt32         1 where the ray has left the volume, or never met it
+    lost: Any  #       UInt32         1 where it has used up its steps
+    steps: Any  #      UInt32         steps made so far
+
+
+def fly(
+    field: Field, origin: Any, direction: Any, *, accuracy: Any, max_steps: Any, stations: Stations, size: int
+) -> _Records:
+    """Fly rays through the field and write down their state at each station.
+
+    Parameters
+    ----------
+    field : Field
+    origin, direction : Array3f, m and 1
+        As in `march`.
+    accuracy : Float, rad
+    max_steps : UInt32
+    stations : Stations
+    size : int
+        Number of states that are written, by all rays together.
+
+    Notes
+    -----
+    Surfaces are not looked for. Before and after the volume the rays are straight.
+    """
+    types = field.types
+    entry = field.entry(origin, direction)
+    enters = entry < dr.inf
+    start = dr.select(enters, entry, 0)
+    flight = Flight.begin(field, dr.fma(direction, start, origin), direction, start, enters, FIRST_TRIAL)
+    Float, UInt32 = types.Float, types.UInt32
+    records = _Records(
+        position=[dr.opaque(Float, 0, shape=size) for _ in range(3)],
+        direction=[dr.opaque(Float, 0, shape=size) for _ in range(3)],
+        stray=dr.opaque(Float, 0, shape=size),
+        outside=dr.opaque(UInt32, 0, shape=size),
+        lost=dr.opaque(UInt32, 0, shape=size),
+        steps=dr.opaque(UInt32, 0, shape=size),
+    )
+    _fly(field, accuracy, UInt32(max_steps), flight, stations, records)
+    return records
+
+
+@dr.syntax
+def _fly(
+    field: Field, accuracy: Any, max_steps: Any, flight: Flight, stations: Stations, records: _Records
+) -> None:
+    k = type(stations.first)(0)
+    count = type(stations.first)(stations.count)
+    while dr.hint(k < count, label="fly to stations", exclude=[records, stations]):
+        limit = dr.gather(type(flight.path), stations.lengths, stations.first + k * stations.step, k < count)
+        flight = _reach(field, accuracy, max_steps, flight, limit, k < count)
+        _write(records, stations.target + k * stations.stride, flight, limit, max_steps)
+        k += 1
+
+
+def _reach(field: Field, accuracy: Any, max_steps: Any, flight: Flight, limit: Any, active: Any) -> Flight:
+    """Bend the ray as far as the limit, or to the face of the volume."""
+    rule = ControlledSteps(
+        field,
+        accuracy=accuracy,
+        max_steps=max_steps,
+        limit=limit,
+        chord_tolerance=None,
+        max_chord_steps=1,
+        details=False,
+    )
+    flight = flight.at_new_chord()
+    return run(rule, flight, active & rule.flying(flight))
+
+
+def _write(records: _Records, index: Any, flight: Flight, limit: Any, max_steps: Any) -> None:
+    ahead = dr.normalize(flight.momentum)
+    # Outside the ray is straight: before it (the flight waits at the entry) as well as behind.
+    straight = ~flight.inside | (flight.path > limit)
+    position = dr.fma(ahead, dr.select(straight, limit - flight.path, 0), flight.position)
+    for axis in range(3):
+        dr.scatter(records.position[axis], position[axis], index)
+        dr.scatter(records.direction[axis], ahead[axis], index)
+    dr.scatter(records.stray, flight.chord_length * flight.chord_turn * 0.25, index)
+    one = type(index)(1)
+    dr.scatter(records.outside, dr.select(flight.inside, 0, one), index)
+    lost = flight.inside & (flight.steps >= max_steps)
+    dr.scatter(records.lost, dr.select(lost, one, 0), index)
+    dr.scatter(records.steps, flight.steps, index)
+
