@@ -80,8 +80,8 @@ class Bending:
         """The medium in double precision, where it can be had."""
         return self.medium if self._reference is None else self._reference()
 
-    def prepare(self, scene: Any, sensor: Any) -> None:
-        """Measure a pixel of the sensor, and lay the paths that its rays can share."""
+    def prepare(self, scene: Any, sensor: Any, samples: float) -> None:
+        """Measure a pixel of the sensor, and lay the paths that its rays, `samples` per pixel, can share."""
         pinhole = Pinhole.of(sensor)
         self._set_pixel_angle(_pixel_angle(sensor) if pinhole is None else pinhole.pixel_angle)
         if pinhole is None or not self.controlled or not self.tracer.sharing:
@@ -100,6 +100,7 @@ class Bending:
             self.boxes(scene),
             accuracy=self.angle,
             max_steps=self.tracer.max_steps,
+            rays=samples,
             types=self.medium.types,
         )
         self._made_for = made_for

@@ -85,6 +85,7 @@ def picture(
     counted = hasattr(integrator, "reset_counts")
     if counted:
         integrator.reset_counts()
+        integrator.planned = samples
     width, height = (int(length) for length in sensor.film().crop_size())
     total = np.zeros((height, width, 3), dtype=np.float64)
     progress.start("rendering", samples)

@@ -92,6 +92,7 @@ def integrator_class(variant: str) -> Any:
             self.extinction = 0.0 if visibility is None else KOSCHMIEDER / (visibility * self.frame.scale)
             self.limit_depth = 2**32 - 1 if settings.max_depth < 0 else settings.max_depth
             self.bends_scattered = True
+            self.planned = 0  # samples per pixel of all passes together; 0: those of each render call
             self.reset_counts()
             self.bending = Bending(medium, settings.tracer, self.frame, reference)
 
@@ -107,7 +108,8 @@ def integrator_class(variant: str) -> Any:
             if isinstance(sensor, int):
                 sensor = scene.sensors()[sensor]
             self.bends_scattered = self.bending.method != "straight" and _has_mirrors(scene)
-            self.bending.prepare(scene, sensor)
+            samples = self.planned or options.get("spp") or sensor.sampler().sample_count()
+            self.bending.prepare(scene, sensor, samples)
             return super().render(scene, sensor, *args, **options)
 
         def report(self, scene: Any, sensor: Any) -> ErrorReport | None:

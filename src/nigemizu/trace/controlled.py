@@ -122,7 +122,7 @@ class ControlledSteps(StepRule):
             down = _crossing(x.z - cell.lower.z, -p.z, -k0.z)
             allowed = dr.minimum(allowed, dr.minimum(up, down)) * _OVERSHOOT
         if cell.reach is not None:
-            allowed = dr.minimum(allowed, cell.reach)
+            allowed = dr.minimum(allowed, cell.reach * dr.rsqrt(dr.squared_norm(p)))
         if self.chord_tolerance is not None:
             allowed = dr.minimum(allowed, self._chord_room(flight, k0))
         return allowed
@@ -181,7 +181,8 @@ class ControlledSteps(StepRule):
             + dr.select(passes, (n0 * n0 + 4 * n1 * n1 + n2 * n2) * (h / 6), 0),
             turning=turning,
             steps=flight.steps + 1,
-            inside=self.field.contains(position),
+            # At the face itself rounding may have it outside before the first step.
+            inside=dr.select(passes, self.field.contains(position), flight.inside),
             trial=trial,
             error=flight.error + dr.select(passes, tried.error, 0),
             chord_steps=flight.chord_steps + made,

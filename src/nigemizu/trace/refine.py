@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final, final
@@ -15,7 +16,7 @@ from nigemizu.trace.scout import BLOCK, Segments
 from nigemizu.trace.stations import Stations, fly
 from nigemizu.trace.view import View, types_of
 
-__all__ = ["RECORD", "PathTable", "refine"]
+__all__ = ["RECORD", "Flown", "PathTable", "fly_places", "refine"]
 
 FloatArray = NDArray[np.float64]
 Array = NDArray[np.floating[Any]]
@@ -26,7 +27,8 @@ _MOST: Final = (16, 64)
 _FINEST: Final = (32, 128)  # the same of the table, which is linear in between
 _LOCAL: Final = 4  # degree of the polynomials that lead from one to the other
 _GAIN: Final = 0.25  # of what the coarser grid misses, that the finer one may miss
-_POLYNOMIAL, _LINEAR = 0.3, 0.2  # of the accuracy, for each of the two and each direction
+_WORTH: Final = 0.5  # nodes per ray
+_POLYNOMIAL, _LINEAR = 0.35, 0.25  # of the accuracy, for each of the two and each direction
 
 
 @final
@@ -61,7 +63,14 @@ class PathTable:
 
 
 def refine(
-    field: Field, view: View, segments: Segments, *, accuracy: float, integration: float, max_steps: int
+    field: Field,
+    view: View,
+    segments: Segments,
+    *,
+    accuracy: float,
+    integration: float,
+    max_steps: int,
+    rays: float = np.inf,
 ) -> PathTable:
     """Fly the rays of the nodes, on finer and finer grids where the interpolation is not good enough.
 
@@ -74,6 +83,8 @@ def refine(
     integration : float, rad
         Accuracy of the nodes' paths.
     max_steps : int
+    rays : float
+        Rays that will pass through each block: more nodes than a share of them are not worth it.
 
     Notes
     -----
@@ -81,8 +92,8 @@ def refine(
     polynomial of degree 1, 2 or 4 through the coarser one's. A quarter of the difference is taken as the
     error of the polynomial through all of them (Lagrange's, of degree 2 or 4). Where it is too large the
     cells are halved; else the table's own grid is filled from the polynomials, so finely that between its
-    nodes it may be linear. A block whose finest grid does not suffice, or which has a ray that runs out of
-    steps, is not shared.
+    nodes it may be linear. A block whose finest grid does not suffice, or would have too many nodes if each
+    halving brought the error down to a quarter, or which has a ray that runs out of steps, is not shared.
     """
     table = _Table(len(segments.count))
     flown, steps = 0, 0.0
@@ -98,12 +109,21 @@ def refine(
             wrong = [_GAIN * _displacement(*_against_coarser(states, axis), segments, blocks) for axis in (0, 1)]
             coarse = [(w > _POLYNOMIAL * accuracy) & ~lost for w in wrong]
             good = np.flatnonzero(~coarse[0] & ~coarse[1] & ~lost)
+            worth = _nodes(part.grid, wrong, _POLYNOMIAL * accuracy) <= _WORTH * rays
+            coarse = [c & worth for c in coarse]
             table.put(states[..., good], segments, blocks[good], (wrong[0] + wrong[1])[good], _LINEAR * accuracy)
-            for finer, factors, members in _doubled(part.grid, coarse):
+            for finer, factors, members in _doubled(part.grid, coarse, _MOST):
                 opened = _Open(finer, blocks[members], states[..., members], factors)
                 next_.setdefault((finer, factors), []).append(opened)
         waiting = [_merged(parts) for parts in next_.values()]
     return table.frozen(steps, flown)
+
+
+def _nodes(grid: tuple[int, int], wrong: list[FloatArray], accuracy: float) -> FloatArray:
+    """How many nodes each block would need in the end, if each halving left a quarter of the error."""
+    return np.prod(
+        [n * np.maximum(np.sqrt(w / accuracy), 1) + 1 for n, w in zip(grid, wrong, strict=True)], axis=0
+    )
 
 
 @final
@@ -124,13 +144,13 @@ def _merged(parts: list[_Open]) -> _Open:
 
 
 def _doubled(
-    grid: tuple[int, int], coarse: list[NDArray[np.bool_]]
+    grid: tuple[int, int], coarse: list[NDArray[np.bool_]], most: tuple[int, int]
 ) -> Iterator[tuple[tuple[int, int], tuple[int, int], NDArray[np.intp]]]:
     """The next finer grids, the factors, and the members that are too coarse across, down, or both."""
     for factors in ((2, 1), (1, 2), (2, 2)):
         finer = (grid[0] * factors[0], grid[1] * factors[1])
         members = np.flatnonzero((coarse[0] == (factors[0] > 1)) & (coarse[1] == (factors[1] > 1)))
-        if finer[0] <= _MOST[0] and finer[1] <= _MOST[1] and len(members):
+        if finer[0] <= most[0] and finer[1] <= most[1] and len(members):
             yield finer, factors, members
 
 
@@ -168,7 +188,7 @@ class _Table:
         for value in np.unique(code):
             members = np.flatnonzero(code == value)
             pair = divmod(int(value), 1024)
-            weights = [_lagrange(n, min(n, _LOCAL), np.linspace(0, 1, c + 1)) for n, c in zip(grid, pair, strict=True)]
+            weights = [_lagrange(n, min(n, _LOCAL), c) for n, c in zip(grid, pair, strict=True)]
             self._keep(_spread(states[..., members], *weights), blocks[members], pair, error[members])
 
     def _keep(self, states: Array, blocks: NDArray[np.intp], cells: tuple[int, int], error: FloatArray) -> None:
@@ -207,20 +227,21 @@ def _fly_nodes(
     fresh = [_fresh(part) for part in parts]
     places = [_places(segments, part, mask) for part, mask in zip(parts, fresh, strict=True)]
     x, y = (np.concatenate([place[i] for place in places]) for i in (0, 1))
-    flown, lost_rays, steps = _fly(field, view, x, y, np.concatenate([p[2] for p in places], axis=1), accuracy, max_steps)
+    lengths = np.concatenate([place[2] for place in places], axis=1)
+    flown = fly_places(field, view, x, y, lengths, accuracy, max_steps)
     states, lost, at = [], [], 0
     for part, mask in zip(parts, fresh, strict=True):
         blocks, nodes = len(part.blocks), int(mask.sum())
         rays = slice(at, at + nodes * blocks)
         at += nodes * blocks
-        filled = np.empty((*mask.shape, stops, 6, blocks), dtype=flown.dtype)
+        filled = np.empty((*mask.shape, stops, 6, blocks), dtype=flown.states.dtype)
         # (6, stop, node, block) → (node, stop, 6, block)
-        filled[mask] = flown[..., rays].reshape(6, stops, nodes, blocks).transpose(2, 1, 0, 3)
+        filled[mask] = flown.states[..., rays].reshape(6, stops, nodes, blocks).transpose(2, 1, 0, 3)
         if part.states is not None:
             filled[_known(part)] = part.states
         states.append(filled)
-        lost.append(lost_rays[rays].reshape(nodes, blocks).any(axis=0))
-    return _Round(states, lost, steps, at)
+        lost.append(flown.lost[rays].reshape(nodes, blocks).any(axis=0))
+    return _Round(states, lost, flown.steps, at)
 
 
 def _known(part: _Open) -> tuple[slice, slice]:
@@ -249,11 +270,21 @@ def _places(segments: Segments, part: _Open, fresh: NDArray[np.bool_]) -> tuple[
     return ((x + across) * BLOCK[0]).ravel(), ((y + down) * BLOCK[1]).ravel(), lengths.reshape(len(lengths), -1)
 
 
-def _fly(
-    field: Field, view: View, x: FloatArray, y: FloatArray, lengths: FloatArray, accuracy: float, max_steps: int
-) -> tuple[Array, NDArray[np.bool_], float]:
+@final
+@dataclass(frozen=True)
+class Flown:
     """States (6, stops, rays) as offsets from the straight rays [m] and deflections [1], in the view's frame;
     which rays were lost, and the steps of all together."""
+
+    states: Array
+    lost: NDArray[np.bool_]
+    steps: float
+
+
+def fly_places(
+    field: Field, view: View, x: FloatArray, y: FloatArray, lengths: FloatArray, accuracy: float, max_steps: int
+) -> Flown:
+    """Fly the rays of places x, y (rays,) [pixels] to their path lengths (stops, rays) [m]."""
     types = field.types
     Float, UInt32 = types.Float, types.UInt32
     stops, rays = lengths.shape
@@ -277,11 +308,17 @@ def _fly(
     dr.eval(offset, deflection)
     states = np.stack([np.asarray(part) for part in (*offset, *deflection)]).reshape(6, stops, rays)
     lost = np.asarray(records.lost).reshape(stops, rays)[-1] > 0
-    return states, lost, float(np.asarray(records.steps).reshape(stops, rays)[-1].sum(dtype=np.float64))
+    steps = float(np.asarray(records.steps).reshape(stops, rays)[-1].sum(dtype=np.float64))
+    return Flown(states, lost, steps)
 
 
-def _lagrange(grid: int, degree: int, places: FloatArray) -> FloatArray:
-    """Weights (places, grid + 1) of equally spaced nodes on [0, 1], for polynomials on pieces of `degree` cells."""
+@functools.cache
+def _lagrange(grid: int, degree: int, cells: int, between: bool = False) -> FloatArray:
+    """Weights (places, grid + 1) of equally spaced nodes on [0, 1], for polynomials on pieces of `degree` cells.
+
+    The places are the nodes of a grid of `cells`, or only every second of them, from the second on.
+    """
+    places = np.linspace(0, 1, cells + 1)[1::2] if between else np.linspace(0, 1, cells + 1)
     weights = np.zeros((len(places), grid + 1))
     pieces = grid // degree
     piece = np.minimum((places * pieces).astype(int), pieces - 1)
@@ -290,6 +327,7 @@ def _lagrange(grid: int, degree: int, places: FloatArray) -> FloatArray:
         others = [j for j in range(degree + 1) if j != i]
         weight = np.prod([(t - j) / (i - j) for j in others], axis=0)
         weights[np.arange(len(places)), piece * degree + i] = weight
+    weights.flags.writeable = False
     return weights
 
 
@@ -320,7 +358,7 @@ def _against_coarser(states: Array, axis: int) -> tuple[Array, Array]:
     if axis == 0:
         states = states.swapaxes(0, 1)
     grid = len(states) - 1
-    weights = _lagrange(grid // 2, min(grid // 2, _LOCAL), np.linspace(0, 1, grid + 1)[1::2])
+    weights = _lagrange(grid // 2, min(grid // 2, _LOCAL), grid, between=True)
     return states[1::2], _weighted(states[::2], weights)
 
 

@@ -12,16 +12,19 @@ from numpy.typing import NDArray
 from nigemizu.field import Bottomless, BoxedField, Field, Types
 from nigemizu.trace.ends import ESCAPED, HIT, NOT_TRACED, RayEnd
 from nigemizu.trace.march import march
-from nigemizu.trace.refine import PathTable, refine
+from nigemizu.trace.refine import PathTable, fly_places, refine
 from nigemizu.trace.scout import BLOCK, Segments, scout
 from nigemizu.trace.surfaces import Surface
-from nigemizu.trace.view import View
+from nigemizu.trace.view import View, types_of
 
 __all__ = ["SharedPaths", "SharingReport", "grounded", "share_paths"]
 
-_SHARING: Final = 0.6  # of the accuracy that sharing may use up
+_SHARING: Final = 0.8  # of the accuracy that sharing may use up
 _INTEGRATION: Final = 0.05  # the same of the integration: cells, not the accuracy, decide the steps
 _NEAR: Final = 0.2  # the same of the integration within a segment
+_QUIET: Final = 0.02  # of the accuracy: blocks whose error is estimated smaller are not tested
+_TESTS: Final = 4  # rays in each of the others
+_R2: Final = (0.7548776662466927, 0.5698402909980532)  # steps of Roberts' sequence, which spreads evenly
 _MOST_LEVERAGE: Final = 50.0
 _END_OF_GROUND: Final = 1e5  # m
 _SHORT: Final = 0.3  # of the way to its end, that a segment may take up and count as short
@@ -55,7 +58,14 @@ class SharingReport:
 
 
 def share_paths(
-    field: Field, view: View, boxes: NDArray[np.float64], *, accuracy: float, max_steps: int, types: Types | None = None
+    field: Field,
+    view: View,
+    boxes: NDArray[np.float64],
+    *,
+    accuracy: float,
+    max_steps: int,
+    rays: float = 16.0,
+    types: Types | None = None,
 ) -> SharedPaths:
     """Build the table of paths for the rays of one eye.
 
@@ -70,6 +80,8 @@ def share_paths(
         Displacement, seen from the eye, that bending and sharing may add.
     max_steps : int
         Most intervals per path.
+    rays : float
+        Rays per pixel that will use the table.
     types : Types, optional
         Array types of the rays that will use the table; by default those of the field.
 
@@ -91,9 +103,41 @@ def share_paths(
         field, view, boxes, accuracy=integration, max_steps=max_steps, farthest=farthest, floor=floor
     )
     table = refine(
-        field, view, segments, accuracy=accuracy * _SHARING, integration=integration, max_steps=max_steps
+        field, view, segments, accuracy=accuracy * _SHARING, integration=integration, max_steps=max_steps,
+        rays=rays * BLOCK[0] * BLOCK[1],
     )
-    return SharedPaths(types or field.types, view, segments, table)
+    paths = SharedPaths(types or field.types, view, segments, table)
+    paths.withdraw(_wrong_blocks(field, view, segments, table, paths, accuracy, integration, max_steps))
+    return paths
+
+
+def _wrong_blocks(
+    field: Field,
+    view: View,
+    segments: Segments,
+    table: PathTable,
+    paths: SharedPaths,
+    accuracy: float,
+    integration: float,
+    max_steps: int,
+) -> NDArray[np.intp]:
+    """Blocks in which a few rays between the nodes, flown for the purpose, differ too much from the table.
+
+    What the grids' own comparison cannot see: a kink between two nodes.
+    """
+    blocks = np.flatnonzero((table.cells[:, 0] > 0) & (table.error > _QUIET * accuracy))
+    if not len(blocks):
+        return blocks
+    row, column = np.divmod(blocks, segments.columns)
+    u, v = ((0.5 + np.arange(1, _TESTS + 1)[:, None] * step) % 1.0 for step in _R2)
+    x, y = ((column + u) * BLOCK[0]).ravel(), ((row + v) * BLOCK[1]).ravel()
+    lengths = np.tile(segments.last[blocks], _TESTS)[None]
+    flown = fly_places(field, view, x, y, lengths, integration, max_steps).states[:, 0].astype(np.float64)
+    read = paths.last_states(types_of(paths.types, view.directions(x, y)))
+    wrong = np.abs(flown - read)
+    offset, deflection = (np.linalg.norm(wrong[i : i + 3], axis=0) for i in (0, 3))
+    displaced = np.maximum(offset / np.maximum(lengths[0], 1.0), deflection).reshape(_TESTS, -1).max(axis=0)
+    return blocks[displaced > accuracy]
 
 
 def _farthest(field: Field, view: View, boxes: NDArray[np.float64]) -> float:
@@ -155,6 +199,7 @@ class SharedPaths:
         Float, UInt32 = types.Float, types.UInt32
         self.types = types
         self.view = view
+        self._blocks = len(segments.count)
         self._columns = dr.opaque(UInt32, segments.columns)
         self._rows = dr.opaque(UInt32, segments.rows)
         self._most = dr.opaque(UInt32, segments.start.shape[1])
@@ -232,6 +277,25 @@ class SharedPaths:
             end = _choose(end, march(field, eye, d, active=single, **fine), single)
         return replace(end, status=dr.select(active, end.status, UInt32(NOT_TRACED)))
 
+    def withdraw(self, blocks: NDArray[np.intp]) -> None:
+        """Have the rays of these blocks marched one by one."""
+        if not len(blocks):
+            return
+        for number, cells in enumerate(self._cells):
+            counts = np.array(cells)
+            counts[blocks] = 0
+            self._cells[number] = self.types.UInt32(counts)
+        self.everywhere = False
+        self.report = replace(self.report, shared=self.report.shared - len(blocks) / self._blocks)
+
+    def last_states(self, direction: Any) -> NDArray[np.float64]:
+        """Offset [m] and deflection where the last straight pieces begin, in the view's frame: (6, N)."""
+        place = self._find(direction)
+        length = dr.gather(self.types.Float, self._last, place.block)
+        offset, deflection = self._interpolated(place, self._most, True)
+        dr.eval(offset, deflection, length)
+        return np.stack([np.asarray(part, dtype=np.float64) for part in (*offset, *deflection)])
+
     def _find(self, direction: Any) -> _Place:
         UInt32, Float = self.types.UInt32, self.types.Float
         x, y = self.view.locate(direction)
@@ -244,6 +308,13 @@ class SharedPaths:
         self, place: _Place, segment: Any, length: Any, eye: Any, direction: Any, active: Any
     ) -> tuple[Any, Any]:
         """Position [m] and unit direction at the beginning of a segment, at path length `length`."""
+        offset, deflection = self._interpolated(place, segment, active)
+        offset = self.view.from_frame(direction, offset)
+        deflection = self.view.from_frame(direction, deflection)
+        return dr.fma(direction, length, eye) + offset, dr.normalize(direction + deflection)
+
+    def _interpolated(self, place: _Place, segment: Any, active: Any) -> tuple[Any, Any]:
+        """Offset and deflection at the beginning of a segment, between the four nearest nodes."""
         UInt32, Float = self.types.UInt32, self.types.Float
         across, down = (dr.maximum(dr.gather(UInt32, cells, place.block, active), 1) for cells in self._cells)
         x, y = place.x * Float(across), place.y * Float(down)
@@ -253,9 +324,7 @@ class SharedPaths:
         row = dr.gather(UInt32, self._base, place.block, active) + (segment * (down + 1) + j) * (across + 1) + i
         near, far = self._pair(row, u, active), self._pair(row + across + 1, u, active)
         offset, deflection = (dr.lerp(a, b, v) for a, b in zip(near, far, strict=True))
-        offset = self.view.from_frame(direction, offset)
-        deflection = self.view.from_frame(direction, deflection)
-        return dr.fma(direction, length, eye) + offset, dr.normalize(direction + deflection)
+        return offset, deflection
 
     def _pair(self, record: Any, u: Any, active: Any) -> tuple[Any, Any]:
         """Offset and deflection between a node and its neighbour to the right."""

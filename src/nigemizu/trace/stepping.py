@@ -45,7 +45,8 @@ class Flight:
         n, _ = field.value_and_gradient(position, inside)
         return cls(
             position=types.Array3f(position),
-            momentum=types.Array3f(direction * n),
+            # Opaque: a component known to be 0 may not stay so, as the loops' recording would have it.
+            momentum=types.Array3f(direction * n + dr.opaque(Float, 0)),
             path=Float(path),
             optical=Float(path * n),
             turning=Float(dr.inf),

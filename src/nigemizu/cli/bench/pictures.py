@@ -23,14 +23,16 @@ __all__ = ["VARIANT", "fluctuating_road", "measure_film", "measure_growth", "mea
 
 VARIANT: Final[Variant] = "llvm"
 STOCK: Final = {"type": "direct"}
-"""Mitsuba's own integrator of direct light, which our pictures show too."""
+"""Mitsuba's own integrator of direct light."""
+DIRECT: Final = 2
+"""Segments of a path of light that reaches the eye from a source by one surface."""
 FLUCTUATION: Final = 0.5  # K, root mean square
 
 _REPORTED: Final = {
-    "steps_per_ray": "mean_steps",
-    "queries_per_ray": "mean_queries",
-    "worst_error_pixels": "worst_error",
-    "mean_error_pixels": "mean_error",
+    "steps_per_ray": "steps",
+    "queries_per_ray": "queries",
+    "worst_error_pixels": "worst",
+    "mean_error_pixels": "mean",
 }
 """Our names → those of the report of a picture."""
 
@@ -52,24 +54,43 @@ def measure_picture(
     Returns
     -------
     dict
-        Seconds of each and their ratios, and ``report``: steps and geometry queries per ray and the estimated
-        errors in pixels of the bent picture, None where it does not tell them.
+        Seconds of each and their ratios to Mitsuba's, and ``report``: steps and geometry queries per ray and
+        the estimated errors in pixels of the bent picture.
 
     Notes
     -----
-    All three render the same Mitsuba scene in the same passes, from the call to the picture in NumPy; the
-    bent one is handed its air anew, as every frame of a film is.
+    ``bent`` and ``straight`` are the scene's pictures as a film takes them, frame after frame: air onto the
+    device (bent only), haze, light scattered once, the report of errors, and the picture in NumPy. Mitsuba's
+    ``direct`` has neither haze nor scattered light. ``bent_alike`` and ``straight_alike`` do without them
+    too, and are timed like it, from camera to radiance; the bent one lays its shared paths anew each time.
     """
-    from nigemizu.render import build, picture
+    import drjit as dr
+    import mitsuba as mi
+
+    from nigemizu.render import build
     from nigemizu.scene.rendering import Studio
 
     studio, camera = Studio(scene, VARIANT), scene.camera
-    stock = build(camera, scene.light, scene.objects, integrator=STOCK)
+    built = build(camera, scene.light, scene.objects, integrator=STOCK)
+    bent, put_air_in = _alike(scene, air)
+    straight, _ = _alike(scene.with_changes({"tracer.method": "straight"}), None)
     taken: list[RenderedPicture] = []
+
+    def radiance(integrator: Any) -> None:
+        seed = dr.opaque(mi.UInt32, camera.seed)
+        dr.eval(integrator.render(built, built.sensors()[0], seed=seed, spp=camera.samples))
+        dr.sync_thread()
+
+    def bent_alike() -> None:
+        put_air_in()
+        radiance(bent)
+
     works: dict[str, Callable[[], object]] = {
+        "stock": lambda: radiance(built.integrator()),
+        "bent_alike": bent_alike,
+        "straight_alike": lambda: radiance(straight),
         "bent": lambda: taken.append(studio.shoot(air)),
         "straight": partial(studio.shoot, None),
-        "stock": partial(picture, stock, samples=camera.samples, seed=camera.seed),
     }
     seconds = alternate(works, repeats, label=label, progress=progress)
     nz, ny, nx = air.refractivity.shape
@@ -78,10 +99,25 @@ def measure_picture(
         "samples": camera.samples,
         "nodes": [nx, ny, nz],
         **{f"{name}_seconds": value for name, value in seconds.items()},
-        "bent_over_stock": seconds["bent"] / seconds["stock"],
-        "straight_over_stock": seconds["straight"] / seconds["stock"],
+        **{f"{name}_over_stock": value / seconds["stock"] for name, value in seconds.items() if name != "stock"},
         "report": _report(taken[-1]),
     }
+
+
+def _alike(scene: Scene, air: AirVolume | None) -> tuple[Any, Callable[[], None]]:
+    """Our integrator of direct light without haze, and what puts the air in, which lies on the device."""
+    from nigemizu.render import Settings, integrator, medium_of
+
+    settings = Settings(tracer=scene.tracer, visibility=None, max_depth=DIRECT)
+    ours = integrator(settings=settings)
+    if air is None:
+        return ours, lambda: None
+    angle = scene.tracer.angle(scene.camera.pixel_angle)
+    make = partial(medium_of, *air[:4], tracer=scene.tracer, angle=angle)
+    medium = make()
+    # In air that varies with height alone the shared paths are double; elsewhere nothing asks for it here.
+    double = make(precision="double", storage="single") if medium.stratified else medium
+    return ours, lambda: ours.set_medium(medium, lambda: double)
 
 
 def _report(picture: RenderedPicture) -> dict[str, float] | None:

@@ -61,21 +61,24 @@ def _picture(name: str, found: dict[str, Any]) -> list[Row]:
     error = "not reported"
     if report is not None:
         error = f"{report['mean_error_pixels']:.2g} (worst {report['worst_error_pixels']:.2g}) pixel"
+    timed = {
+        "  Mitsuba's direct": "stock",
+        "  bent / direct, light of direct": "bent_alike",
+        "  straight / direct, light of direct": "straight_alike",
+        "  bent / direct, scene as it is": "bent",
+        "  straight / direct, scene as it is": "straight",
+    }
     return [
-        Row(
-            f"{name}, {width}×{height}, {found['samples']} samples, {nx}×{ny}×{nz} nodes",
-            f"{found['bent_seconds']:.2f} s",
-            f"{found['bent_over_stock']:.2f} × Mitsuba's direct",
-        ),
-        Row(
-            "  our straight light",
-            f"{found['straight_seconds']:.2f} s",
-            f"{found['straight_over_stock']:.2f} × Mitsuba's direct",
-        ),
-        Row("  Mitsuba's direct", f"{found['stock_seconds']:.2f} s"),
+        Row(f"{name}, {width}×{height}, {found['samples']} samples, {nx}×{ny}×{nz} nodes", ""),
+        *(_timed(what, found, key) for what, key in timed.items()),
         *told,
         Row("  estimated displacement error", error),
     ]
+
+
+def _timed(what: str, found: dict[str, Any], key: str) -> Row:
+    over = found.get(f"{key}_over_stock")
+    return Row(what, f"{found[f'{key}_seconds']:.2f} s", "" if over is None else f"{over:.2f} × Mitsuba's direct")
 
 
 def _march(found: dict[str, Any]) -> list[Row]:
