@@ -98,7 +98,9 @@ class Axis(ABC):
             # Two plain numbers would make the choice between them single precision.
             inverse_width=dr.select(below | above, self._types.Float(0), span.inverse_width),
             lower=dr.select(below, self._types.Float(self.outer[0]), node),
-            upper=dr.select(below, self._first, dr.select(above, self._types.Float(self.outer[1]), span.upper)),
+            upper=dr.select(
+                below, self._first, dr.select(above, self._types.Float(self.outer[1]), span.upper)
+            ),
         )
 
     @abstractmethod

@@ -87,7 +87,11 @@ class Bending:
         if pinhole is None or not self.controlled or not self.tracer.sharing:
             self.paths = None
             return
-        made_for = (id(scene), pinhole.size, *(v.tobytes() for v in (pinhole.origin, pinhole.c0, pinhole.cu, pinhole.cv)))
+        made_for = (
+            id(scene),
+            pinhole.size,
+            *(v.tobytes() for v in (pinhole.origin, pinhole.c0, pinhole.cu, pinhole.cv)),
+        )
         if self.paths is not None and made_for == self._made_for:
             return
         stratified = self.medium.stratified
@@ -160,7 +164,11 @@ class Bending:
             )
         control = self._control()
         if self._step is not None:
-            control |= {"accuracy": None, "step": self._step, "stepper": trace.stepper_named(self.tracer.stepper)}
+            control |= {
+                "accuracy": None,
+                "step": self._step,
+                "stepper": trace.stepper_named(self.tracer.stepper),
+            }
         return trace.march(self.medium, origin, direction, surface=surface, active=active, **control)
 
     def _control(self) -> dict[str, Any]:

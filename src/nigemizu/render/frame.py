@@ -108,8 +108,9 @@ class _Query:
         self._scene = scene
         self._frame = frame
         self._coherent = coherent
-        self.blank = dr.zeros(mi.PreliminaryIntersection3f)
-        self.blank.t = mi.Float(dr.inf)
+        nothing: Any = dr.zeros(mi.PreliminaryIntersection3f)
+        nothing.t = mi.Float(dr.inf)
+        self.blank = nothing
 
     def __call__(self, origin: Any, direction: Any, length: Any, active: Any) -> tuple[Any, Any, Any]:
         scene_origin, scene_direction = self._frame.to_scene(origin, direction)
@@ -122,7 +123,7 @@ class _Query:
         return dr.mask_t(length)(met.is_valid()), type(length)(met.t / self._frame.scale), met
 
 
-def surface_query(scene: Any) -> Callable[[Any, Any, Any, Any], tuple[Any, Any]]:
+def surface_query(scene: Any) -> Surface:
     """The surfaces of a Mitsuba scene as the callback that `nigemizu.trace` takes.
 
     Parameters

@@ -104,7 +104,7 @@ def integrator_class(variant: str) -> Any:
             self.bending.set_medium(medium, reference)
 
         def render(self, scene: Any, sensor: Any = 0, *args: Any, **options: Any) -> Any:
-            """Render (the interface of `mi.Integrator`); lays the paths that the picture's rays share first."""
+            """Render (the interface of `mi.Integrator`); first lays the paths that the rays share."""
             if isinstance(sensor, int):
                 sensor = scene.sensors()[sensor]
             self.bends_scattered = self.bending.method != "straight" and _has_mirrors(scene)
@@ -226,7 +226,9 @@ def integrator_class(variant: str) -> Any:
             lost = status == int(trace.RayStatus.OUT_OF_STEPS)
             hit = si.is_valid() & ~lost
             for index, ended in enumerate((hit, ~hit & ~lost, lost)):
-                dr.scatter_reduce(dr.ReduceOp.Add, self.counts, mi.UInt32(1), mi.UInt32(index), active & ended)
+                dr.scatter_reduce(
+                    dr.ReduceOp.Add, self.counts, mi.UInt32(1), mi.UInt32(index), active & ended
+                )
 
         def horizon_radiance(self, scene: Any, ray: Any, active: Any) -> Any:
             """Radiance of the sky at the horizon, in the azimuth of `ray`."""
@@ -263,7 +265,9 @@ def _balance(pdf_a: Any, pdf_b: Any) -> Any:
 def _has_mirrors(scene: Any) -> bool:
     """Whether anything in the scene reflects or passes light without scattering it."""
     flags = mi.BSDFFlags.Delta
-    return any(mi.has_flag(shape.bsdf().flags(), flags) for shape in scene.shapes() if shape.bsdf() is not None)
+    return any(
+        mi.has_flag(shape.bsdf().flags(), flags) for shape in scene.shapes() if shape.bsdf() is not None
+    )
 
 
 def _media(settings: Settings, resolve_air: AirResolver | None) -> tuple[Any, Callable[[], Any]]:

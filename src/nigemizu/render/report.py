@@ -127,7 +127,9 @@ def _spread(sensor: Any) -> Any:
     return ray
 
 
-def _displacement(field: Any, origin: Any, direction: Any, end: trace.RayEnd, accuracy: float, nearby: float) -> Any:
+def _displacement(
+    field: Any, origin: Any, direction: Any, end: trace.RayEnd, accuracy: float, nearby: float
+) -> Any:
     """Displacement [rad] of each ray's end from where it ought to be after the same path length.
 
     `nearby` [rad] is how far neighbours leave the eye from the ray, to see how the air magnifies.

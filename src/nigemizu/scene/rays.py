@@ -236,7 +236,10 @@ def _follow(
     march: dict[str, Any] = {"max_steps": tracer.max_steps, "surface": surface}
     if tracer.step is None:
         pixel = scene.camera.pixel_angle
-        march |= {"accuracy": tracer.angle(pixel) * _FINER, "chord_tolerance": tracer.chord_tolerance * pixel * _FINER}
+        march |= {
+            "accuracy": tracer.angle(pixel) * _FINER,
+            "chord_tolerance": tracer.chord_tolerance * pixel * _FINER,
+        }
     else:
         march |= {"step": tracer.step, "stepper": trace.stepper_named(tracer.stepper)}
     end = trace.march(through, origin, ahead, details=True, **march)

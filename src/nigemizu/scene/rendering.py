@@ -22,6 +22,7 @@ __all__ = ["Studio", "render", "warn_of_errors", "warn_of_lost_rays"]
 _SEEN_SHARE: Final = 5e-3
 _FIXED_STEP_ERROR: Final = 1.0  # pixels that a fixed step may err by without a warning
 
+
 @final
 class Studio:
     """A scene's camera, light and objects, ready to be seen through air.

@@ -4,7 +4,8 @@ from nigemizu.trace.ends import ESCAPED, HIT, NOT_TRACED, OUT_OF_STEPS, STOPPED,
 from nigemizu.trace.layered import cross_layers, straight
 from nigemizu.trace.march import march
 from nigemizu.trace.paths import record_paths
-from nigemizu.trace.shared import SharedPaths, SharingReport, grounded, share_paths
+from nigemizu.trace.shared import SharedPaths, SharingReport
+from nigemizu.trace.sharing import grounded, share_paths
 from nigemizu.trace.steppers import EULER, LEAPFROG, STEPPERS, SUZUKI4, YOSHIDA4, Stepper, stepper_named
 from nigemizu.trace.surfaces import Surface, combine, ground_plane
 from nigemizu.trace.tracer import Tracer
@@ -13,7 +14,6 @@ from nigemizu.trace.view import ElevationView, View
 __all__ = [
     "ESCAPED",
     "EULER",
-    "ElevationView",
     "HIT",
     "LEAPFROG",
     "NOT_TRACED",
@@ -22,6 +22,7 @@ __all__ = [
     "STOPPED",
     "SUZUKI4",
     "YOSHIDA4",
+    "ElevationView",
     "RayEnd",
     "RayStatus",
     "SharedPaths",

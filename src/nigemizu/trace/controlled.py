@@ -128,7 +128,7 @@ class ControlledSteps(StepRule):
         return allowed
 
     def _chord_room(self, flight: Flight, k0: Any) -> Any:
-        """Interval h after which the chord still lies within the tolerance, if the ray turns as sharply as here.
+        """Interval h after which the chord lies within the tolerance still, if the ray turns as it does here.
 
         An arc of length L that turns by θ strays by Lθ/8: h solves (L + h)(θ + κh) = 8 × tolerance.
         """
@@ -177,8 +177,7 @@ class ControlledSteps(StepRule):
             position=position,
             momentum=dr.select(passes, tried.momentum, flight.momentum),
             path=flight.path + dr.select(passes, length, 0),
-            optical=flight.optical
-            + dr.select(passes, (n0 * n0 + 4 * n1 * n1 + n2 * n2) * (h / 6), 0),
+            optical=flight.optical + dr.select(passes, (n0 * n0 + 4 * n1 * n1 + n2 * n2) * (h / 6), 0),
             turning=turning,
             steps=flight.steps + 1,
             # At the face itself rounding may have it outside before the first step.

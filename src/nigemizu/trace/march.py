@@ -7,8 +7,8 @@ from typing import Any
 
 import drjit as dr
 
-from nigemizu.field import Field
 from nigemizu.errors import InputError
+from nigemizu.field import Field
 from nigemizu.trace.chords import Chord
 from nigemizu.trace.controlled import FIRST_TRIAL, ControlledSteps
 from nigemizu.trace.ends import RayEnd, choose_status
@@ -17,6 +17,7 @@ from nigemizu.trace.stepping import FixedSteps, Flight, StepRule
 from nigemizu.trace.surfaces import Surface
 
 __all__ = ["march", "run"]
+
 
 def march(
     field: Field,

@@ -106,12 +106,16 @@ def refine(
         next_: dict[tuple[Any, Any], list[_Open]] = {}
         for part, states, lost in zip(waiting, round_.states, round_.lost, strict=True):
             blocks = part.blocks
-            wrong = [_GAIN * _displacement(*_against_coarser(states, axis), segments, blocks) for axis in (0, 1)]
+            wrong = [
+                _GAIN * _displacement(*_against_coarser(states, axis), segments, blocks) for axis in (0, 1)
+            ]
             coarse = [(w > _POLYNOMIAL * accuracy) & ~lost for w in wrong]
             good = np.flatnonzero(~coarse[0] & ~coarse[1] & ~lost)
             worth = _nodes(part.grid, wrong, _POLYNOMIAL * accuracy) <= _WORTH * rays
             coarse = [c & worth for c in coarse]
-            table.put(states[..., good], segments, blocks[good], (wrong[0] + wrong[1])[good], _LINEAR * accuracy)
+            table.put(
+                states[..., good], segments, blocks[good], (wrong[0] + wrong[1])[good], _LINEAR * accuracy
+            )
             for finer, factors, members in _doubled(part.grid, coarse, _MOST):
                 opened = _Open(finer, blocks[members], states[..., members], factors)
                 next_.setdefault((finer, factors), []).append(opened)
@@ -121,15 +125,14 @@ def refine(
 
 def _nodes(grid: tuple[int, int], wrong: list[FloatArray], accuracy: float) -> FloatArray:
     """How many nodes each block would need in the end, if each halving left a quarter of the error."""
-    return np.prod(
-        [n * np.maximum(np.sqrt(w / accuracy), 1) + 1 for n, w in zip(grid, wrong, strict=True)], axis=0
-    )
+    across, down = (n * np.maximum(np.sqrt(w / accuracy), 1) + 1 for n, w in zip(grid, wrong, strict=True))
+    return np.asarray(across * down)
 
 
 @final
 @dataclass(frozen=True)
 class _Open:
-    """Blocks that need a finer grid, the states of the coarser one (None at first), and how many times finer."""
+    """Blocks that need a finer grid, the states of the coarser one (None at first), and how much finer."""
 
     grid: tuple[int, int]
     blocks: NDArray[np.intp]
@@ -191,7 +194,9 @@ class _Table:
             weights = [_lagrange(n, min(n, _LOCAL), c) for n, c in zip(grid, pair, strict=True)]
             self._keep(_spread(states[..., members], *weights), blocks[members], pair, error[members])
 
-    def _keep(self, states: Array, blocks: NDArray[np.intp], cells: tuple[int, int], error: FloatArray) -> None:
+    def _keep(
+        self, states: Array, blocks: NDArray[np.intp], cells: tuple[int, int], error: FloatArray
+    ) -> None:
         rows, columns, stops, _, count = states.shape
         records = np.zeros((count, stops, rows, columns, RECORD), dtype=states.dtype)
         ordered = states.transpose(4, 2, 0, 1, 3)
@@ -211,7 +216,7 @@ class _Table:
 @final
 @dataclass(frozen=True)
 class _Round:
-    """What one launch brought: per part the states (rows, columns, stops, 6, blocks) and which blocks lost a ray."""
+    """What one launch brought: per part the states (rows, columns, stops, 6, blocks), and the lost blocks."""
 
     states: list[Array]
     lost: list[NDArray[np.bool_]]
@@ -240,7 +245,7 @@ def _fly_nodes(
         if part.states is not None:
             filled[_known(part)] = part.states
         states.append(filled)
-        lost.append(flown.lost[rays].reshape(nodes, blocks).any(axis=0))
+        lost.append(np.any(flown.lost[rays].reshape(nodes, blocks), axis=0))
     return _Round(states, lost, flown.steps, at)
 
 
@@ -256,7 +261,9 @@ def _fresh(part: _Open) -> NDArray[np.bool_]:
     return fresh
 
 
-def _places(segments: Segments, part: _Open, fresh: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _places(
+    segments: Segments, part: _Open, fresh: NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Place of each ray (nodes · blocks) in pixels, and its path lengths (stops, nodes · blocks)."""
     blocks = part.blocks
     row, column = np.nonzero(fresh)
@@ -267,7 +274,11 @@ def _places(segments: Segments, part: _Open, fresh: NDArray[np.bool_]) -> tuple[
     lengths[:-1] = upper + (lower - upper) * down
     lengths[-1] = segments.last[blocks]
     y, x = np.divmod(blocks, segments.columns)
-    return ((x + across) * BLOCK[0]).ravel(), ((y + down) * BLOCK[1]).ravel(), lengths.reshape(len(lengths), -1)
+    return (
+        ((x + across) * BLOCK[0]).ravel(),
+        ((y + down) * BLOCK[1]).ravel(),
+        lengths.reshape(len(lengths), -1),
+    )
 
 
 @final
@@ -282,7 +293,13 @@ class Flown:
 
 
 def fly_places(
-    field: Field, view: View, x: FloatArray, y: FloatArray, lengths: FloatArray, accuracy: float, max_steps: int
+    field: Field,
+    view: View,
+    x: FloatArray,
+    y: FloatArray,
+    lengths: FloatArray,
+    accuracy: float,
+    max_steps: int,
 ) -> Flown:
     """Fly the rays of places x, y (rays,) [pixels] to their path lengths (stops, rays) [m]."""
     types = field.types
@@ -314,7 +331,7 @@ def fly_places(
 
 @functools.cache
 def _lagrange(grid: int, degree: int, cells: int, between: bool = False) -> FloatArray:
-    """Weights (places, grid + 1) of equally spaced nodes on [0, 1], for polynomials on pieces of `degree` cells.
+    """Weights (places, grid + 1) of equally spaced nodes on [0, 1], for polynomials over `degree` cells each.
 
     The places are the nodes of a grid of `cells`, or only every second of them, from the second on.
     """
@@ -375,4 +392,4 @@ def _displacement(states: Array, others: Array, segments: Segments, blocks: NDAr
     end = np.maximum(segments.end[blocks], 1.0).T
     there = (offset[:-1] + deflection[:-1] * np.maximum(end - start, 0)) / end
     there[np.arange(len(there))[:, None] >= segments.count[blocks]] = 0
-    return np.maximum(displaced, there.max(axis=0)).astype(np.float64)
+    return np.asarray(np.maximum(displaced, there.max(axis=0)), dtype=np.float64)

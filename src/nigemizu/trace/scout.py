@@ -110,13 +110,13 @@ def scout(
     height = np.asarray(offsets[2]).reshape(_STATIONS, -1) + view.eye[2]
     gone = np.asarray(records.outside, dtype=bool).reshape(_STATIONS, -1) | (height < floor - _DEEP)
     outside = gone[:, corners].all(axis=2)
-    lost = np.asarray(records.lost, dtype=bool).reshape(_STATIONS, -1)[-1][corners].any(axis=1)
+    lost = np.any(np.asarray(records.lost, dtype=bool).reshape(_STATIONS, -1)[-1][corners], axis=1)
     # The first station behind which all four corners fly straight, or are lost to light; else the last one.
     exits = np.where(outside.any(axis=0), outside.argmax(axis=0), _STATIONS - 1)
     last = s[1:][exits]
     contacts = _contacts(field, view, boxes, records, offsets, corners, s, accuracy)
     start, end, count = _join(contacts, last)
-    looks = (contacts.end > last).any(axis=0) & (contacts.end >= contacts.begin).any(axis=0)
+    looks = np.any((contacts.end > last) & (contacts.end >= contacts.begin), axis=0)
     return Segments(columns, rows, start, end, count, last, lost, looks)
 
 
@@ -142,7 +142,13 @@ class _Contacts:
 
 
 def _fly_corners(
-    field: Field, view: View, x: FloatArray, y: FloatArray, lengths: FloatArray, accuracy: float, max_steps: int
+    field: Field,
+    view: View,
+    x: FloatArray,
+    y: FloatArray,
+    lengths: FloatArray,
+    accuracy: float,
+    max_steps: int,
 ) -> tuple[Any, list[Any]]:
     """Records at every station of the corners' rays, and their offsets from the eye in the view's frame.
 
@@ -224,7 +230,9 @@ def _contacts(
             own[number].append((begin - margin, end - margin, begin + margin, end + margin))
     if not len(boxes):
         empty = np.full((intervals, blocks), np.inf)
-        return _Contacts(empty, -empty, np.zeros(empty.shape, dtype=np.int64), np.full((*empty.shape, 4), np.inf))
+        return _Contacts(
+            empty, -empty, np.zeros(empty.shape, dtype=np.int64), np.full((*empty.shape, 4), np.inf)
+        )
     first, final, box, touches = _sweep(types, whole, own, view.boxes(boxes))
     begin, end = dr.fma(s1 - s0, first, s0), dr.fma(s1 - s0, final, s0)
     contacts = [dr.select(t <= 1, dr.fma(s1 - s0, t, s0), dr.inf) for t in touches]
@@ -296,9 +304,7 @@ def _reduce(operation: Any, values: list[Any]) -> Any:
     return total
 
 
-def _join(
-    contacts: _Contacts, last: FloatArray
-) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+def _join(contacts: _Contacts, last: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
     """Join what lies in neighbouring intervals, and cut it where the rays are straight to their end.
 
     Returns starts (B, M, 4), ends (B, M) and their number (B,).

@@ -9,24 +9,19 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from nigemizu.field import Bottomless, BoxedField, Field, Types
-from nigemizu.trace.ends import ESCAPED, HIT, NOT_TRACED, RayEnd
+from nigemizu.field import Field, Types
+from nigemizu.trace.ends import ESCAPED, HIT, NOT_TRACED, STOPPED, RayEnd
 from nigemizu.trace.march import march
-from nigemizu.trace.refine import PathTable, fly_places, refine
-from nigemizu.trace.scout import BLOCK, Segments, scout
+from nigemizu.trace.refine import PathTable
+from nigemizu.trace.scout import BLOCK, Segments
 from nigemizu.trace.surfaces import Surface
-from nigemizu.trace.view import View, types_of
+from nigemizu.trace.view import View
 
-__all__ = ["SharedPaths", "SharingReport", "grounded", "share_paths"]
+__all__ = ["INTEGRATION", "SharedPaths", "SharingReport"]
 
-_SHARING: Final = 0.8  # of the accuracy that sharing may use up
-_INTEGRATION: Final = 0.05  # the same of the integration: cells, not the accuracy, decide the steps
+INTEGRATION: Final = 0.05  # the same of the integration: cells, not the accuracy, decide the steps
 _NEAR: Final = 0.2  # the same of the integration within a segment
-_QUIET: Final = 0.02  # of the accuracy: blocks whose error is estimated smaller are not tested
-_TESTS: Final = 4  # rays in each of the others
-_R2: Final = (0.7548776662466927, 0.5698402909980532)  # steps of Roberts' sequence, which spreads evenly
 _MOST_LEVERAGE: Final = 50.0
-_END_OF_GROUND: Final = 1e5  # m
 _SHORT: Final = 0.3  # of the way to its end, that a segment may take up and count as short
 _FEW: Final = 0.05  # of all segments, that may be longer
 
@@ -55,124 +50,6 @@ class SharingReport:
     shared: float
     error: float
     segments: float
-
-
-def share_paths(
-    field: Field,
-    view: View,
-    boxes: NDArray[np.float64],
-    *,
-    accuracy: float,
-    max_steps: int,
-    rays: float = 16.0,
-    types: Types | None = None,
-) -> SharedPaths:
-    """Build the table of paths for the rays of one eye.
-
-    Parameters
-    ----------
-    field : Field
-        In double precision where the table shall be.
-    view : View
-    boxes : (N, 2, 3) float64, m
-        Boxes that together contain every surface (none: nothing can be hit).
-    accuracy : float, rad
-        Displacement, seen from the eye, that bending and sharing may add.
-    max_steps : int
-        Most intervals per path.
-    rays : float
-        Rays per pixel that will use the table.
-    types : Types, optional
-        Array types of the rays that will use the table; by default those of the field.
-
-    Returns
-    -------
-    SharedPaths
-
-    Raises
-    ------
-    InputError
-        Where the volume and the objects have no end.
-    """
-    farthest = _farthest(field, view, boxes)
-    deepened = grounded(field, boxes)
-    floor = field.lower[2] if isinstance(field, BoxedField) and deepened is not field else -np.inf
-    field = deepened
-    integration = accuracy * _INTEGRATION
-    segments = scout(
-        field, view, boxes, accuracy=integration, max_steps=max_steps, farthest=farthest, floor=floor
-    )
-    table = refine(
-        field, view, segments, accuracy=accuracy * _SHARING, integration=integration, max_steps=max_steps,
-        rays=rays * BLOCK[0] * BLOCK[1],
-    )
-    paths = SharedPaths(types or field.types, view, segments, table)
-    paths.withdraw(_wrong_blocks(field, view, segments, table, paths, accuracy, integration, max_steps))
-    return paths
-
-
-def _wrong_blocks(
-    field: Field,
-    view: View,
-    segments: Segments,
-    table: PathTable,
-    paths: SharedPaths,
-    accuracy: float,
-    integration: float,
-    max_steps: int,
-) -> NDArray[np.intp]:
-    """Blocks in which a few rays between the nodes, flown for the purpose, differ too much from the table.
-
-    What the grids' own comparison cannot see: a kink between two nodes.
-    """
-    blocks = np.flatnonzero((table.cells[:, 0] > 0) & (table.error > _QUIET * accuracy))
-    if not len(blocks):
-        return blocks
-    row, column = np.divmod(blocks, segments.columns)
-    u, v = ((0.5 + np.arange(1, _TESTS + 1)[:, None] * step) % 1.0 for step in _R2)
-    x, y = ((column + u) * BLOCK[0]).ravel(), ((row + v) * BLOCK[1]).ravel()
-    lengths = np.tile(segments.last[blocks], _TESTS)[None]
-    flown = fly_places(field, view, x, y, lengths, integration, max_steps).states[:, 0].astype(np.float64)
-    read = paths.last_states(types_of(paths.types, view.directions(x, y)))
-    wrong = np.abs(flown - read)
-    offset, deflection = (np.linalg.norm(wrong[i : i + 3], axis=0) for i in (0, 3))
-    displaced = np.maximum(offset / np.maximum(lengths[0], 1.0), deflection).reshape(_TESTS, -1).max(axis=0)
-    return blocks[displaced > accuracy]
-
-
-def _farthest(field: Field, view: View, boxes: NDArray[np.float64]) -> float:
-    """Path length [m] within which every object and every bounded side of the volume lies."""
-    corners = [np.abs(boxes.reshape(-1, 3) - view.eye).max(axis=0)] if len(boxes) else []
-    for bound in (getattr(field, "lower", None), getattr(field, "upper", None)):
-        if bound is not None:
-            about = np.abs(np.asarray(bound) - view.eye)
-            corners.append(np.where(np.isfinite(about), about, 0.0))
-    reach = float(np.linalg.norm(np.max(corners, axis=0))) if corners else 0.0
-    return max(reach, 10.0) * 1.01
-
-
-def grounded(field: Field, boxes: NDArray[np.float64]) -> Field:
-    """The field, continued below its floor (`nigemizu.field.Bottomless`) where a flat ground covers that.
-
-    Parameters
-    ----------
-    field : Field
-    boxes : (N, 2, 3) float64, m
-        As for `share_paths`.
-    """
-    return Bottomless(field) if isinstance(field, BoxedField) and _is_covered(field, boxes) else field
-
-
-def _is_covered(field: BoxedField, boxes: NDArray[np.float64]) -> bool:
-    """Whether a flat ground lies on the floor of the volume, so that no light leaves it there."""
-    lower, upper = np.asarray(field.lower), np.asarray(field.upper)
-    if not np.isfinite(lower[2]) or not len(boxes):
-        return False
-    # Without sides the air ends where the ground of the picture does.
-    west, east = np.maximum(lower[:2], -_END_OF_GROUND), np.minimum(upper[:2], _END_OF_GROUND)
-    flat = np.all(np.abs(boxes[:, :, 2] - lower[2]) < 1e-3, axis=1)
-    wide = np.all((boxes[:, 0, :2] <= west) & (boxes[:, 1, :2] >= east), axis=1)
-    return bool(np.any(flat & wide))
 
 
 @final
@@ -262,8 +139,11 @@ class SharedPaths:
         eye = Array3f(*self._eye)
         place = self._find(d)
         options = {
-            "accuracy": accuracy, "max_steps": max_steps, "surface": surface, "chord_tolerance": chord_tolerance,
-        }  # fmt: skip
+            "accuracy": accuracy,
+            "max_steps": max_steps,
+            "surface": surface,
+            "chord_tolerance": chord_tolerance,
+        }
         shared = active & (dr.gather(UInt32, self._cells[0], place.block, active) > 0)
         end = self._last_piece(eye, d, place, shared, getattr(surface, "blank", None))
         if surface is not None:
@@ -273,9 +153,27 @@ class SharedPaths:
             end = _test_beyond(end, far_surface or surface, looks & (end.status == ESCAPED))
         if not self.everywhere:
             single = active & ~shared
-            fine = options | {"accuracy": accuracy * _INTEGRATION}
-            end = _choose(end, march(field, eye, d, active=single, **fine), single)
+            end = _choose(end, self._march_single(field, eye, d, place, single, options), single)
         return replace(end, status=dr.select(active, end.status, UInt32(NOT_TRACED)))
+
+    def _march_single(
+        self, field: Field, eye: Any, direction: Any, place: _Place, active: Any, options: dict[str, Any]
+    ) -> RayEnd:
+        """March rays that share nothing: at first without a look at objects, up to where the first can be."""
+        options = options | {"accuracy": options["accuracy"] * INTEGRATION}
+        starts = dr.gather(self.types.Array4f, self._start, place.block * self._most, active)
+        first = dr.min(starts)
+        blind = options | {"surface": None, "chord_tolerance": None}
+        before = march(field, eye, direction, max_distance=first, active=active, **blind)
+        arrived = active & (before.status == STOPPED)
+        end = march(field, before.position, before.direction, travelled=first, active=arrived, **options)
+        lost = active & ~arrived
+        return replace(
+            end,
+            status=dr.select(lost, before.status, end.status),
+            steps=end.steps + before.steps,
+            error=end.error + before.error,
+        )
 
     def withdraw(self, blocks: NDArray[np.intp]) -> None:
         """Have the rays of these blocks marched one by one."""
@@ -321,7 +219,9 @@ class SharedPaths:
         i = UInt32(dr.clip(x, 0, Float(across - 1)))
         j = UInt32(dr.clip(y, 0, Float(down - 1)))
         u, v = x - Float(i), y - Float(j)
-        row = dr.gather(UInt32, self._base, place.block, active) + (segment * (down + 1) + j) * (across + 1) + i
+        row = (
+            dr.gather(UInt32, self._base, place.block, active) + (segment * (down + 1) + j) * (across + 1) + i
+        )
         near, far = self._pair(row, u, active), self._pair(row + across + 1, u, active)
         offset, deflection = (dr.lerp(a, b, v) for a, b in zip(near, far, strict=True))
         return offset, deflection

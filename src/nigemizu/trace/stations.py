@@ -133,4 +133,3 @@ def _write(records: _Records, index: Any, flight: Flight, limit: Any, max_steps:
     lost = flight.inside & (flight.steps >= max_steps)
     dr.scatter(records.lost, dr.select(lost, one, 0), index)
     dr.scatter(records.steps, flight.steps, index)
-

@@ -43,6 +43,7 @@ class Flight:
         types = field.types
         Float, UInt32 = types.Float, types.UInt32
         n, _ = field.value_and_gradient(position, inside)
+        n = dr.select(inside, n, 1)
         return cls(
             position=types.Array3f(position),
             # Opaque: a component known to be 0 may not stay so, as the loops' recording would have it.

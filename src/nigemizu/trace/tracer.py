@@ -23,7 +23,7 @@ class Tracer(Value):
     accuracy: float = Described(
         0.1,
         gt=0,
-        description="largest displacement in the picture that the computation may add to the bend of the air; "
+        description="largest displacement in the picture that the computation may add to that of the air; "
         "the intervals along the ray follow from it",
     )
     accuracy_unit: Literal["pixel", "radian"] = Described(

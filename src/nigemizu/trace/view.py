@@ -43,7 +43,7 @@ class View(ABC):
         """Place (Float, Float) of a direction (Array3f, unit length) on the device."""
 
     def to_frame(self, direction: Any, vector: Any) -> Any:
-        """A vector (Array3f) in the axes that offsets of this ray are kept in; by default those of the air."""
+        """A vector (Array3f) in the axes in which offsets of this ray are kept; by default the air's."""
         return vector
 
     def from_frame(self, direction: Any, vector: Any) -> Any:
@@ -81,7 +81,9 @@ class ElevationView(View):
         return np.stack([np.cos(elevation), np.zeros_like(elevation), np.sin(elevation)], axis=-1)
 
     def locate(self, direction: Any) -> tuple[Any, Any]:
-        elevation = dr.atan2(direction.z, dr.sqrt(dr.fma(direction.x, direction.x, direction.y * direction.y)))
+        elevation = dr.atan2(
+            direction.z, dr.sqrt(dr.fma(direction.x, direction.x, direction.y * direction.y))
+        )
         return type(elevation)(0), (self._high - elevation) * (1 / self.pixel_angle)
 
     def to_frame(self, direction: Any, vector: Any) -> Any:

@@ -18,7 +18,7 @@ from nigemizu.cli.bench.pictures import (
     measure_picture,
 )
 from nigemizu.cli.bench.rays import FLAT, Voxels, measure_march
-from nigemizu.cli.bench.superior import stratified_seconds
+from nigemizu.cli.bench.superior import measure_far_view
 from nigemizu.cli.bench.timing import OFTEN, SELDOM
 from nigemizu.cli.meter import meter
 from nigemizu.progress import ProgressMeter
@@ -58,7 +58,7 @@ class Sizes:
     ----------
     picture, film, growth : (int, int)
         Width and height in pixels.
-    samples, growth_samples : int
+    samples, road_samples, growth_samples : int
         Rays per pixel.
     road, growth_road, memory : (int, int, int)
         Nodes along x, y and z.
@@ -82,6 +82,7 @@ class Sizes:
 
     picture: tuple[int, int] = (960, 540)
     samples: int = 16
+    road_samples: int = 4
     road: Nodes = (512, 128, 64)
     march: Voxels = FLAT
     rays: int = 2**19
@@ -163,7 +164,7 @@ class _Suite:
 
     def road(self, progress: ProgressMeter) -> dict[str, Any]:
         sizes = self._sizes
-        scene = sizes.scene("road", sizes.picture, sizes.samples)
+        scene = sizes.scene("road", sizes.picture, sizes.road_samples)
         air = fluctuating_road(scene, sizes.road)
         return measure_picture(scene, air, sizes.seldom, label="road", progress=progress)
 
@@ -172,7 +173,7 @@ class _Suite:
         return measure_march(sizes.march, sizes.rays, sizes.steps, sizes.often, progress=progress)
 
     def stratified(self, progress: ProgressMeter) -> dict[str, Any]:
-        return stratified_seconds(self._sizes.far, repeats=self._sizes.often, progress=progress)
+        return measure_far_view(self._sizes.far, repeats=self._sizes.often, progress=progress)
 
     def panes(self, progress: ProgressMeter) -> dict[str, Any]:
         return measure_panes(self._fan, self._sizes.panes, progress=progress)

@@ -93,10 +93,12 @@ def _march(found: dict[str, Any]) -> list[Row]:
 
 
 def _stratified(found: dict[str, Any]) -> Row:
+    error = found["error_pixels"]
+    told = "nothing came there" if error is None else f"error at the wall {error:.2g} pixel at worst"
     return Row(
-        f"stratified air, {found['distance'] / 1000:.0f} km, {found['pixels']:,} pixels",
+        f"stratified air, a wall at {found['distance'] / 1000:.0f} km, {found['pixels']:,} rays",
         f"{found['seconds']:.3f} s",
-        f"{found['rays']:,} rays marched, accuracy {found['accuracy_radians']:.0e} rad",
+        f"{found['table_seconds']:.3f} s of it for {found['paths']:,} shared paths; {told}",
     )
 
 

@@ -1,0 +1,145 @@
+"""Laying the paths that the rays of a picture share."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nigemizu.field import Bottomless, BoxedField, Field, Types
+from nigemizu.trace.refine import PathTable, fly_places, refine
+from nigemizu.trace.scout import BLOCK, Segments, scout
+from nigemizu.trace.shared import INTEGRATION, SharedPaths
+from nigemizu.trace.view import View, types_of
+
+__all__ = ["grounded", "share_paths"]
+
+_SHARING: Final = 0.8  # of the accuracy that sharing may use up
+_QUIET: Final = 0.02  # of the accuracy: blocks whose error is estimated smaller are not tested
+_TESTS: Final = 4  # rays in each of the others
+_R2: Final = (0.7548776662466927, 0.5698402909980532)  # steps of Roberts' sequence, which spreads evenly
+_END_OF_GROUND: Final = 1e5  # m
+
+
+def share_paths(
+    field: Field,
+    view: View,
+    boxes: NDArray[np.float64],
+    *,
+    accuracy: float,
+    max_steps: int,
+    rays: float = 16.0,
+    types: Types | None = None,
+) -> SharedPaths:
+    """Build the table of paths for the rays of one eye.
+
+    Parameters
+    ----------
+    field : Field
+        In double precision where the table shall be.
+    view : View
+    boxes : (N, 2, 3) float64, m
+        Boxes that together contain every surface (none: nothing can be hit).
+    accuracy : float, rad
+        Displacement, seen from the eye, that bending and sharing may add.
+    max_steps : int
+        Most intervals per path.
+    rays : float
+        Rays per pixel that will use the table.
+    types : Types, optional
+        Array types of the rays that will use the table; by default those of the field.
+
+    Returns
+    -------
+    SharedPaths
+
+    Raises
+    ------
+    InputError
+        Where the volume and the objects have no end.
+    """
+    farthest = _farthest(field, view, boxes)
+    deepened = grounded(field, boxes)
+    floor = field.lower[2] if isinstance(field, BoxedField) and deepened is not field else -np.inf
+    field = deepened
+    integration = accuracy * INTEGRATION
+    segments = scout(
+        field, view, boxes, accuracy=integration, max_steps=max_steps, farthest=farthest, floor=floor
+    )
+    table = refine(
+        field,
+        view,
+        segments,
+        accuracy=accuracy * _SHARING,
+        integration=integration,
+        max_steps=max_steps,
+        rays=rays * BLOCK[0] * BLOCK[1],
+    )
+    paths = SharedPaths(types or field.types, view, segments, table)
+    paths.withdraw(_wrong_blocks(field, view, segments, table, paths, accuracy, integration, max_steps))
+    return paths
+
+
+def _wrong_blocks(
+    field: Field,
+    view: View,
+    segments: Segments,
+    table: PathTable,
+    paths: SharedPaths,
+    accuracy: float,
+    integration: float,
+    max_steps: int,
+) -> NDArray[np.intp]:
+    """Blocks in which a few rays between the nodes, flown for the purpose, differ too much from the table.
+
+    What the grids' own comparison cannot see: a kink between two nodes.
+    """
+    blocks = np.flatnonzero((table.cells[:, 0] > 0) & (table.error > _QUIET * accuracy))
+    if not len(blocks):
+        return blocks
+    row, column = np.divmod(blocks, segments.columns)
+    u, v = ((0.5 + np.arange(1, _TESTS + 1)[:, None] * step) % 1.0 for step in _R2)
+    x, y = ((column + u) * BLOCK[0]).ravel(), ((row + v) * BLOCK[1]).ravel()
+    lengths = np.tile(segments.last[blocks], _TESTS)[None]
+    flown = fly_places(field, view, x, y, lengths, integration, max_steps).states[:, 0].astype(np.float64)
+    read = paths.last_states(types_of(paths.types, view.directions(x, y)))
+    wrong = np.abs(flown - read)
+    offset, deflection = (np.linalg.norm(wrong[i : i + 3], axis=0) for i in (0, 3))
+    displaced = np.maximum(offset / np.maximum(lengths[0], 1.0), deflection).reshape(_TESTS, -1).max(axis=0)
+    return np.asarray(blocks[displaced > accuracy])
+
+
+def _farthest(field: Field, view: View, boxes: NDArray[np.float64]) -> float:
+    """Path length [m] within which every object and every bounded side of the volume lies."""
+    corners = [np.abs(boxes.reshape(-1, 3) - view.eye).max(axis=0)] if len(boxes) else []
+    for bound in (getattr(field, "lower", None), getattr(field, "upper", None)):
+        if bound is not None:
+            about = np.abs(np.asarray(bound) - view.eye)
+            corners.append(np.where(np.isfinite(about), about, 0.0))
+    reach = float(np.linalg.norm(np.max(corners, axis=0))) if corners else 0.0
+    return max(reach, 10.0) * 1.01
+
+
+def grounded(field: Field, boxes: NDArray[np.float64]) -> Field:
+    """The field, continued below its floor (`nigemizu.field.Bottomless`) where a flat ground covers that.
+
+    Parameters
+    ----------
+    field : Field
+    boxes : (N, 2, 3) float64, m
+        As for `share_paths`.
+    """
+    return Bottomless(field) if isinstance(field, BoxedField) and _is_covered(field, boxes) else field
+
+
+def _is_covered(field: BoxedField, boxes: NDArray[np.float64]) -> bool:
+    """Whether a flat ground lies on the floor of the volume, so that no light leaves it there."""
+    lower, upper = np.asarray(field.lower), np.asarray(field.upper)
+    if not np.isfinite(lower[2]) or not len(boxes):
+        return False
+    # Without sides the air ends where the ground of the picture does.
+    west, east = np.maximum(lower[:2], -_END_OF_GROUND), np.minimum(upper[:2], _END_OF_GROUND)
+    flat = np.all(np.abs(boxes[:, :, 2] - lower[2]) < 1e-3, axis=1)
+    wide = np.all((boxes[:, 0, :2] <= west) & (boxes[:, 1, :2] >= east), axis=1)
+    return bool(np.any(flat & wide))
