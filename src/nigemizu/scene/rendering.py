@@ -108,10 +108,12 @@ def warn_of_errors(report: ErrorReport, scene: Scene) -> None:
 
 
 def _remedy(scene: Scene) -> str:
-    tracer = scene.tracer
-    if tracer.precision != "double":
-        return "set tracer.precision = 'double'"
-    return "set tracer.sharing = false" if tracer.sharing else "ask for less with tracer.accuracy"
+    ways = []
+    if scene.tracer.sharing:
+        ways.append("tracer.sharing = false")
+    if scene.tracer.precision != "double":
+        ways.append("tracer.precision = 'double'")
+    return f"set {' or '.join(ways)}" if ways else "ask for less with tracer.accuracy"
 
 
 def warn_of_lost_rays(statuses: Mapping[str, int], scene: Scene) -> None:

@@ -73,7 +73,7 @@ class ElevationView(View):
     """
 
     def __init__(self, eye: FloatArray, elevations: tuple[float, float], pixel_angle: float) -> None:
-        low, self._high = elevations
+        low, self._high = (float(elevation) for elevation in elevations)
         super().__init__(eye, (0.0, (self._high - low) / pixel_angle), pixel_angle)
 
     def directions(self, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -81,10 +81,11 @@ class ElevationView(View):
         return np.stack([np.cos(elevation), np.zeros_like(elevation), np.sin(elevation)], axis=-1)
 
     def locate(self, direction: Any) -> tuple[Any, Any]:
-        elevation = dr.atan2(
-            direction.z, dr.sqrt(dr.fma(direction.x, direction.x, direction.y * direction.y))
-        )
-        return type(elevation)(0), (self._high - elevation) * (1 / self.pixel_angle)
+        elevation = dr.atan2(direction.z, dr.sqrt(dr.fma(direction.x, direction.x, direction.y * direction.y)))
+        Float = type(elevation)
+        # Opaque: a camera that tilts does not compile the kernel again.
+        high, per_pixel = dr.opaque(Float, self._high), dr.opaque(Float, 1 / self.pixel_angle)
+        return Float(0), (high - elevation) * per_pixel
 
     def to_frame(self, direction: Any, vector: Any) -> Any:
         c, s = self._heading(direction)

@@ -117,7 +117,7 @@ def measure_far_view(
     paths, end = picture()
     chosen = np.linspace(0, width * height - 1, _COMPARED).astype(np.int64)
     there = double.Array3f(np.ascontiguousarray(directions[chosen].T))
-    start = double.Array3f(*eye)
+    start = double.Array3f(*eye.tolist())
     best = settle(
         trace.march(
             exact, start, there, surface=trace.combine(trace.ground_plane(0.0), wall(double, distance)),
