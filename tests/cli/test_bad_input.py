@@ -41,6 +41,7 @@ def assert_refused(done: Any, *words: str, left: set[str] = frozenset()) -> None
         (["trace", "pyramid", "-e", "up", "--json"], ["--elevation", "'up'"]),
         (["trace", "pyramid", "-e", "-91", "--json"], ["elevation", "-91"]),
         (["trace", "pyramid"], ["--json", "-o"]),
+        (["render", "pyramid", "--compare", "--stats"], ["--compare", "--stats"]),
         (["animate", "pyramid", "--duration", "-3"], ["--duration", "-3"]),
     ],
 )
@@ -73,6 +74,17 @@ def test_mistyped_commands(run: Run, typed: list[str], words: list[str]) -> None
         ("camera.eye=[0, 0, 1e7]", ["camera.eye", "10000000.0"]),
         ("camera.target=[0.0, 0.0, 1.3]", ["camera.target"]),
         ("tracer.method='curved'", ["tracer.method", "'curved'", "'bent'"]),
+        ("tracer.accuracy=0", ["tracer.accuracy", "got 0", "> 0"]),
+        ("tracer.accuracy=-1", ["tracer.accuracy", "got -1", "> 0"]),
+        ("tracer.accuracy=abc", ["tracer.accuracy", "'abc'", "a number"]),
+        ("tracer.accuracy=inf", ["tracer.accuracy", "inf", "finite"]),
+        ("tracer.accuracy_unit=px", ["tracer.accuracy_unit", "'px'", "'pixel'", "'radian'"]),
+        ("tracer.acuracy=1", ["tracer.acuracy", "did you mean 'accuracy'?"]),
+        ("tracer.step=0", ["tracer.step", "got 0", "> 0"]),
+        ("tracer.precision=half", ["tracer.precision", "'half'", "'single'", "'double'"]),
+        ("tracer.interpolation=cubic", ["tracer.interpolation", "'cubic'", "'tricubic'"]),
+        ("tracer.sharing=maybe", ["tracer.sharing", "'maybe'", "true or false"]),
+        ("tracer.chord_tolerance=2", ["tracer.chord_tolerance", "got 2", "≤ 1"]),
         ("time.picture=1e6", ["time.picture", "time.duration"]),
         ("objects.1.material={kind='texture', image='gone.png'}", ["objects.1.material.image", "gone.png"]),
         ("objects.1={kind='mesh', file='gone.ply'}", ["objects.1.file", "gone.ply"]),
@@ -227,6 +239,32 @@ def test_llvm_that_cannot_be_used(
     assert (done.code, done.err) == (2, "")
     assert "remedy" in done.out
     assert run("simulate", "pyramid", "-o", "gone/air.nc").err.count("LLVM") == 0
+
+
+@pytest.mark.parametrize(
+    ("state", "words"),
+    [
+        ({"usable": True, "optix": False}, ["libnvoptix.so.1", "NVIDIA_DRIVER_CAPABILITIES=all"]),
+        ({"usable": False, "card": True}, ["535", "nvidia-smi"]),
+        ({"usable": False, "card": False}, ["no NVIDIA card"]),
+    ],
+)
+def test_cuda_that_cannot_be_used(
+    run: Run, monkeypatch: pytest.MonkeyPatch, state: dict[str, bool], words: list[str]
+) -> None:
+    monkeypatch.setattr("nigemizu.cli.doctor.find_backends", lambda: ((19, 1, 7), state["usable"]))
+    monkeypatch.setattr("nigemizu.cli.doctor._has_optix", lambda: state.get("optix", True))
+    monkeypatch.setattr("nigemizu.cli.doctor._has_card", lambda: state.get("card", True))
+    assert_refused(run("render", "pyramid", "--variant", "cuda", "-o", "out.png"), "--variant llvm", *words)
+    done = run("doctor")
+    assert (done.code, done.err) == (0, "")
+    assert all(word in done.out for word in words)
+    assert "can be rendered, by LLVM" in done.out
+    if state["usable"]:
+        # What would be taken by itself does not work: better said than met as a crash.
+        assert_refused(run("render", "pyramid", "-o", "out.png"), "--variant llvm", *words)
+        monkeypatch.setattr("nigemizu.cli.doctor._has_optix", lambda: True)
+        assert "by CUDA and OptiX" in run("doctor").out
 
 
 @pytest.mark.parametrize(("typed", "lines"), [(["check", "pyramid"], 0), (["doctor"], 0), (["bench"], 1)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -25,6 +26,34 @@ def test_render_writes_the_picture_and_says_where(run: Run, small: tuple[str, ..
         assert picture.info["Command"].startswith("nigemizu render pyramid -o mirage.png")
         assert np.asarray(picture).std() > 5  # not one flat colour
     assert scene["camera"]["seed"] == 3
+
+
+def test_stats_tell_of_rays_errors_and_time(run: Run, small: tuple[str, ...]) -> None:
+    done = run("render", "pyramid", "-o", "bent.png", "--stats", *small)
+    assert (done.code, done.out) == (0, "bent.png\n")
+    rays, bending, time = done.err.splitlines()
+    told = re.fullmatch(r"nigemizu: rays: ([\d,]+) hit, ([\d,]+) escaped, 0 out-of-steps", rays)
+    assert told is not None
+    assert sum(int(count.replace(",", "")) for count in told.groups()) == 32 * 18 * 2
+    error = re.match(
+        r"nigemizu: bending: displacement error (\S+) pixels on average, (\S+) at worst", bending
+    )
+    assert error is not None
+    assert 0 < float(error[1]) < float(error[2]) < 0.2
+    assert re.fullmatch(r"nigemizu: time: \d+\.\d s", time)
+    done = run("render", "pyramid", "-o", "straight.png", "--stats", "--method", "straight", *small)
+    assert [line.split()[1] for line in done.err.splitlines()] == ["rays:", "time:"]
+
+
+def test_stats_of_a_film_are_those_of_its_frames(run: Run, small: tuple[str, ...]) -> None:
+    done = run("animate", "pyramid", "-o", "film.mp4", "--stats", "--frames", "2", *small)
+    assert (done.code, done.out) == (0, "film.mp4\n")
+    rays, bending, _ = done.err.splitlines()
+    counts = [int(count.replace(",", "")) for count in re.findall(r"([\d,]+) [heo]", rays)]
+    assert sum(counts) == 2 * 32 * 18 * 2
+    assert "displacement error" in bending
+    again = run("animate", "pyramid", "-o", "film.mp4", "--stats", "--frames", "2", *small)
+    assert again.err.splitlines()[0] == "nigemizu: rays: none, every frame was there already"
 
 
 def test_flags_and_set_say_the_same(run: Run, small: tuple[str, ...]) -> None:

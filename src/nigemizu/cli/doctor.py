@@ -6,6 +6,7 @@ its version is asked for and nothing is compiled.
 
 from __future__ import annotations
 
+import ctypes
 import importlib
 import importlib.metadata
 import os
@@ -23,6 +24,7 @@ from nigemizu.memory import available_memory
 __all__ = ["demand_backend", "examine", "find_backends", "import_compiler", "report"]
 
 OLDEST_LLVM: Final = 16
+OLDEST_DRIVER: Final = 535  # of NVIDIA
 _PACKAGES: Final = (
     "mitsuba",
     "drjit",
@@ -48,7 +50,8 @@ def examine() -> dict[str, Any]:
     """
     version, cuda = find_backends()
     state = _llvm_state(version)
-    can_render = state == "found" or cuda
+    cuda_state = _cuda_state(cuda)
+    can_render = state == "found" or cuda_state == "usable"
     return {
         "nigemizu": importlib.metadata.version("nigemizu"),
         "python": platform.python_version(),
@@ -60,13 +63,16 @@ def examine() -> dict[str, Any]:
             "needed": f">= {OLDEST_LLVM}",
             "library": os.environ.get("DRJIT_LIBLLVM_PATH"),
         },
-        "cuda": cuda,
+        "cuda": cuda_state == "usable",
+        "cuda_state": cuda_state,
         "processor": _processor(),
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
         "memory_available": available_memory(),
         "disk_free": shutil.disk_usage(os.getcwd()).free,
         "can_render": can_render,
+        "device": _device(state, cuda_state),
         "remedy": None if state == "found" else _remedy(state),
+        "cuda_remedy": _CUDA_REMEDIES.get(cuda_state),
     }
 
 
@@ -78,14 +84,16 @@ def report(found: dict[str, Any]) -> str:
         ("Python", f"{found['python']} on {found['platform']}"),
         ("packages", ", ".join(f"{name} {version}" for name, version in found["packages"].items())),
         ("LLVM", f"{llvm['state']} {llvm['version'] or ''} (needed {llvm['needed']})".replace("  ", " ")),
-        ("CUDA", "usable" if found["cuda"] else "no usable device"),
+        ("CUDA", found["cuda_state"]),
         ("cores", f"{found['cores']} of {found['processor']}"),
         ("memory", _gigabytes(found["memory_available"]) + " available"),
         ("disk", _gigabytes(found["disk_free"]) + " free here"),
-        ("pictures", "can be rendered" if found["can_render"] else "cannot be rendered"),
+        (
+            "pictures",
+            f"can be rendered, by {found['device']}" if found["can_render"] else "cannot be rendered",
+        ),
     ]
-    if found["remedy"]:
-        rows.append(("remedy", found["remedy"]))
+    rows += [("remedy", found[key]) for key in ("remedy", "cuda_remedy") if found[key]]
     return "\n".join(f"{name:9} {text}" for name, text in rows)
 
 
@@ -118,16 +126,57 @@ def demand_backend(variant: str) -> None:
         With what is missing and the line to type.
     """
     version, cuda = find_backends()
-    if variant == "cuda" and not cuda:
-        raise MachineError("no usable NVIDIA graphics card and driver; use --variant llvm")
     if variant == "cuda" or (variant == "auto" and cuda):
-        return
+        found = _cuda_state(cuda)
+        if found == "usable":
+            return
+        remedy = f", or {_CUDA_REMEDIES[found]}" if found in _CUDA_REMEDIES else ""
+        raise MachineError(f"CUDA cannot be used: {found}; use --variant llvm{remedy}")
     state = _llvm_state(version)
     if state == "missing":
         raise MachineError(f"LLVM {OLDEST_LLVM} or newer is needed and none was found; {_remedy(state)}")
     if version is not None and state == "too old":
         shown = ".".join(map(str, version))
         raise MachineError(f"LLVM {shown} is too old, {OLDEST_LLVM} or newer is needed; {_remedy(state)}")
+
+
+_NO_OPTIX: Final = "no OptiX in the driver"
+_OLD_DRIVER: Final = "the driver is too old or does not answer"
+_CUDA_REMEDIES: Final = {
+    _NO_OPTIX: "install the driver's OptiX library libnvoptix.so.1 (in a container: "
+    "NVIDIA_DRIVER_CAPABILITIES=all)",
+    _OLD_DRIVER: f"update the NVIDIA driver to {OLDEST_DRIVER} or newer; nvidia-smi must list the card",
+}
+
+
+def _cuda_state(usable: bool) -> str:
+    """What CUDA can do for pictures: Mitsuba needs the driver's OptiX as well."""
+    if usable:
+        return "usable" if _has_optix() else _NO_OPTIX
+    return _OLD_DRIVER if _has_card() else "no NVIDIA card"
+
+
+def _has_optix() -> bool:
+    if sys.platform != "linux":
+        return True  # the driver brings it along
+    try:
+        ctypes.CDLL("libnvoptix.so.1")
+    except OSError:
+        return False
+    return True
+
+
+def _has_card() -> bool:
+    return Path("/proc/driver/nvidia/version").exists() or Path("/dev/nvidiactl").exists()
+
+
+def _device(llvm: str, cuda: str) -> str | None:
+    """What pictures are rendered by, unless ``--variant`` says otherwise; None: nothing."""
+    if cuda == "usable":
+        return "CUDA and OptiX"
+    if llvm != "found":
+        return None
+    return "LLVM, with --variant llvm" if cuda == _NO_OPTIX else "LLVM"
 
 
 def _llvm_state(version: tuple[int, ...] | None) -> str:

@@ -225,6 +225,11 @@ def _picture(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--samples", "--spp", type=_positive, metavar="N", help="samples per pixel")
     parser.add_argument("--size", type=picture_size, metavar="WxH", help="picture size in pixels")
     parser.add_argument("--seed", type=_whole, metavar="N", help="seed of the pixel samples")
+    parser.add_argument(
+        "--stats",
+        action="store_true",
+        help="tell on stderr how the rays ended, how far they err, and the time",
+    )
 
 
 def _render(parser: argparse.ArgumentParser) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nigemizu.cli.meter import meter
+from nigemizu.cli.stats import Stats
 from nigemizu.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,14 +39,20 @@ def render(options: argparse.Namespace) -> int:
     scene = _scene(options)
     common: dict[str, Any] = {"time": options.time, "air": options.air, "variant": options.variant}
     output = ready_to_write(_output(options, ".png"), (".png",) if options.compare else (".png", ".exr"))
+    if options.compare and options.stats:
+        raise InputError("--stats tells of one picture", key="--compare", remedy="leave one of them out")
     demand_backend(options.variant)
     _use_threads(options.threads)
+    stats = Stats()
     with _naming(options.scene), meter(quiet=options.quiet) as progress:
         if options.compare:
             written = scene.compare(output, **common, command=options.command, progress=progress)
         else:
             picture = scene.render(**common, progress=progress)
             written = [picture.save(output, command=options.command)]
+            stats.take(picture.statuses, picture.report)
+    if options.stats:
+        print(stats, file=sys.stderr)
     print(*written, sep="\n")
     return 0
 
@@ -57,6 +64,7 @@ def animate(options: argparse.Namespace) -> int:
     scene = _scene(options)
     demand_backend(options.variant)
     _use_threads(options.threads)
+    stats = Stats()
     with _naming(options.scene), meter(quiet=options.quiet) as progress:
         written = scene.animate(
             _output(options, ".mp4"),
@@ -65,7 +73,10 @@ def animate(options: argparse.Namespace) -> int:
             variant=options.variant,
             command=options.command,
             progress=progress,
+            tell=stats.take,
         )
+    if options.stats:
+        print(stats, file=sys.stderr)
     print(written)
     return 0
 

@@ -90,7 +90,7 @@ class Bending:
             self.paths = None
             return
         made_for = (
-            id(scene),
+            _fingerprint(scene),
             pinhole.size,
             *(v.tobytes() for v in (pinhole.origin, pinhole.c0, pinhole.cu, pinhole.cv)),
         )
@@ -193,8 +193,9 @@ class Bending:
 
     def boxes(self, scene: Any) -> NDArray[np.float64]:
         """Boxes (N, 2, 3) that contain the scene's surfaces, in the air's axes, m."""
-        if self._known_boxes is None or self._known_boxes[0] is not scene:
-            self._known_boxes = scene, self.frame.boxes(object_boxes(scene))
+        known = _fingerprint(scene)
+        if self._known_boxes is None or self._known_boxes[0] != known:
+            self._known_boxes = known, self.frame.boxes(object_boxes(scene))
         return self._known_boxes[1]
 
     def _set_pixel_angle(self, angle: float) -> None:
@@ -203,6 +204,19 @@ class Bending:
         self._accuracy = dr.opaque(Float, self.angle)
         chord = min(self.tracer.chord_tolerance * angle, _CHORDS * self.angle)
         self._chord_tolerance = dr.opaque(Float, chord)
+
+
+def _fingerprint(scene: Any) -> tuple[Any, ...]:
+    """What tells that shapes have been exchanged, moved or reshaped."""
+
+    def of(shape: Any) -> tuple[Any, ...]:
+        box = shape.bbox()
+        # Exchanged vertices are another array; shapes in closed form have none.
+        parameters = mi.traverse(shape)
+        vertices = parameters["vertex_positions"].index if "vertex_positions" in parameters else 0
+        return (tuple(box.min), tuple(box.max), vertices)
+
+    return tuple(of(shape) for shape in scene.shapes())
 
 
 def _pixel_angle(sensor: Any) -> float:

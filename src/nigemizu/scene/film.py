@@ -8,7 +8,7 @@ import os
 import signal
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -26,10 +26,11 @@ if TYPE_CHECKING:
     from nigemizu.render.report import ErrorReport
     from nigemizu.scene.model import Scene
 
-__all__ = ["animate", "frames_folder"]
+__all__ = ["Tell", "animate", "frames_folder"]
 
 _Job: TypeAlias = tuple[int, AirVolume | None, Path]
 _Outcome: TypeAlias = "tuple[dict[str, int], ErrorReport | None]"
+Tell: TypeAlias = "Callable[[Mapping[str, int], ErrorReport | None], None]"
 
 
 def animate(
@@ -40,6 +41,7 @@ def animate(
     variant: Variant,
     command: str,
     progress: ProgressMeter,
+    tell: Tell | None = None,
 ) -> Path:
     """See `nigemizu.scene.Scene.animate`."""
     from nigemizu.output import FrameFolder, Provenance, ready_to_write, write_film
@@ -70,7 +72,12 @@ def animate(
     else:
         outcomes = _render_in_processes(scene, jobs, variant, workers, progress)
     progress.finish()
-    _warn(outcomes, scene)
+    statuses, report = _joined(outcomes)
+    warn_of_lost_rays(statuses, scene)
+    if report is not None:
+        warn_of_errors(report, scene)
+    if tell is not None:
+        tell(statuses, report)
     return write_film(path, folder.frames(), fps=scene.film.fps, provenance=provenance, progress=progress)
 
 
@@ -107,15 +114,13 @@ def _jobs(scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSou
             yield index, volume, folder.frame(index)
 
 
-def _warn(outcomes: Sequence[_Outcome], scene: Scene) -> None:
-    """Say of all frames together what is said of one picture."""
+def _joined(outcomes: Sequence[_Outcome]) -> _Outcome:
+    """Of all frames together what is said of one picture."""
     statuses: Counter[str] = Counter()
     for outcome in outcomes:
         statuses.update(outcome[0])
-    warn_of_lost_rays(statuses, scene)
     reports = [outcome[1] for outcome in outcomes if outcome[1] is not None]
-    if reports:
-        warn_of_errors(type(reports[0]).joined(reports), scene)
+    return dict(statuses), type(reports[0]).joined(reports) if reports else None
 
 
 def _render_here(

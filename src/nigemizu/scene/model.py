@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import xarray
 
     from nigemizu.scene import running
+    from nigemizu.scene.film import Tell
     from nigemizu.scene.picture import RenderedPicture
     from nigemizu.scene.rays import TracedRays
     from nigemizu.scene.running import AirSource, Variant
@@ -303,6 +304,7 @@ class Scene(Value):
         variant: Variant = "auto",
         command: str = "",
         progress: ProgressMeter = SILENT,
+        tell: Tell | None = None,
     ) -> Path:
         """Render the film `film` into an MP4 and a folder of numbered frames beside it.
 
@@ -319,6 +321,9 @@ class Scene(Value):
             As for `render`.
         command : str
             Kept in the film's header: how it was made.
+        tell : callable, optional
+            ``tell(statuses, report)`` is called with the camera rays by status and the joined error report
+            (None where no light is bent) of the frames that were rendered.
 
         Returns
         -------
@@ -328,7 +333,7 @@ class Scene(Value):
         from nigemizu.scene import film
 
         seen = self._seen(method, samples)
-        return film.animate(seen, Path(path), air, workers, variant, command, progress)
+        return film.animate(seen, Path(path), air, workers, variant, command, progress, tell)
 
     def trace(
         self,

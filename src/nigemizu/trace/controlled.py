@@ -20,6 +20,7 @@ _CHORD_SLACK: Final = 1.2  # that a step's chord may stray more than foreseen
 _OVERSHOOT: Final = 1 + 1e-5  # relative, so that a step ends beyond the face and not just before it
 _ULPS: Final = 64  # a step is never shorter than so many spacings of the coordinates' numbers
 _TINY: Final = 1e-20  # in place of zero, where it divides
+_FARTHEST: Final = 1e30  # m; in place of infinity, whose products may not be numbers
 _NEWTON: Final = 4  # iterations for the lowest point within a step
 
 
@@ -199,7 +200,7 @@ def _size(vector: Any) -> Any:
 
 def _crossing(distance: Any, speed: Any, pull: Any) -> Any:
     """First σ > 0 at which v σ + a σ²/2 reaches the distance; infinite if it never does."""
-    distance = dr.maximum(distance, 0)
+    distance = dr.clip(distance, 0, _FARTHEST)
     discriminant = dr.fma(speed, speed, 2 * pull * distance)
     root = dr.sqrt(dr.maximum(discriminant, 0))
     # The form that does not subtract equal numbers; going away, only a pull brings it back.

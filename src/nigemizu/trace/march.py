@@ -135,7 +135,8 @@ def march(
 
     # ---- bent inside
     x = Array3f(dr.fma(d, start, origin))
-    flight = Flight.begin(field, x, d, before + start, enters, FIRST_TRIAL)
+    flight = Flight.begin(field, x, d, start, enters, FIRST_TRIAL)
+    flight = replace(flight, path=flight.path + before)
     options = {
         "max_steps": UInt32(max_steps),
         "limit": None if max_distance is None else limit,

@@ -24,10 +24,12 @@ def record_paths(
     origin: ArrayLike,
     directions: ArrayLike,
     *,
-    step: float,
+    accuracy: float | None = None,
+    step: float | None = None,
     max_steps: int,
     stepper: Stepper = LEAPFROG,
     surface: Surface | None = None,
+    chord_tolerance: float | None = None,
     max_distance: float | None = None,
     every: int = 1,
 ) -> tuple[list[NDArray[np.float64]], RayEnd]:
@@ -40,7 +42,7 @@ def record_paths(
     origin : (3,) or (N, 3) array_like, m
     directions : (N, 3) array_like, 1
         Made unit length here.
-    step, max_steps, stepper, surface, max_distance
+    accuracy, step, max_steps, stepper, surface, chord_tolerance, max_distance
         As in `march`.
     every : int
         Steps between two points.
@@ -70,16 +72,18 @@ def record_paths(
     flying = np.ones(len(unit), dtype=bool)
     points, masks, used = [start], [flying], 0
     while used < max_steps and flying.any():
-        left = None if max_distance is None else _distance_left(max_distance, total)
         piece = march(
             field,
             x,
             d,
+            accuracy=accuracy,
             step=step,
             max_steps=min(every, max_steps - used),
             stepper=stepper,
             surface=surface,
-            max_distance=left,
+            chord_tolerance=chord_tolerance,
+            travelled=0.0 if total is None else total.path_length,
+            max_distance=max_distance,
             details=True,
             active=types.Bool(flying),
         )
@@ -96,23 +100,23 @@ def record_paths(
     return [track[kept[:, ray], ray].astype(np.float64) for ray in range(len(unit))], total
 
 
-def _distance_left(max_distance: float, total: RayEnd | None) -> Any:
-    return max_distance if total is None else dr.maximum(max_distance - total.path_length, 0)
-
-
 def _joined(before: RayEnd, piece: RayEnd, active: Any) -> RayEnd:
     """Two consecutive pieces of the same rays as one; rays that have ended stay as they are."""
     lowest = dr.minimum(_or_infinite(before.turning_height), _or_infinite(piece.turning_height))
     later = replace(
         piece,
-        chord_start=before.path_length + piece.chord_start,
-        path_length=before.path_length + piece.path_length,
         optical_path=before.optical_path + piece.optical_path,
         steps=before.steps + piece.steps,
+        queries=before.queries + piece.queries,
+        error=None if piece.error is None else before.error + piece.error,
         turning_height=dr.select(lowest < dr.inf, lowest, dr.nan),
     )
-    names = RayEnd.__dataclass_fields__
-    return RayEnd(**{name: dr.select(active, getattr(later, name), getattr(before, name)) for name in names})
+
+    def choose(name: str) -> Any:
+        value = getattr(later, name)
+        return None if value is None else dr.select(active, value, getattr(before, name))
+
+    return RayEnd(**{name: choose(name) for name in RayEnd.__dataclass_fields__})
 
 
 def _or_infinite(height: Any) -> Any:

@@ -38,8 +38,10 @@ class Flight:
     last_length: Any  #  Float    m    length of the last step
 
     @classmethod
-    def begin(cls, field: Field, position: Any, direction: Any, path: Any, inside: Any, trial: Any) -> Flight:
-        """A ray that begins in the volume after a straight `path` [m], with its first interval [m of σ]."""
+    def begin(
+        cls, field: Field, position: Any, direction: Any, straight: Any, inside: Any, trial: Any
+    ) -> Flight:
+        """A ray that begins in the volume after a straight way [m], with its first interval [m of σ]."""
         types = field.types
         Float, UInt32 = types.Float, types.UInt32
         n, _ = field.value_and_gradient(position, inside)
@@ -48,8 +50,8 @@ class Flight:
             position=types.Array3f(position),
             # Opaque: a component known to be 0 may not stay so, as the loops' recording would have it.
             momentum=types.Array3f(direction * n + dr.opaque(Float, 0)),
-            path=Float(path),
-            optical=Float(path * n),
+            path=Float(straight),
+            optical=Float(straight * n),
             turning=Float(dr.inf),
             steps=UInt32(0),
             inside=types.Bool(inside),

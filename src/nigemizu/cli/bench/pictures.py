@@ -99,7 +99,11 @@ def measure_picture(
         "samples": camera.samples,
         "nodes": [nx, ny, nz],
         **{f"{name}_seconds": value for name, value in seconds.items()},
-        **{f"{name}_over_stock": value / seconds["stock"] for name, value in seconds.items() if name != "stock"},
+        **{
+            f"{name}_over_stock": value / seconds["stock"]
+            for name, value in seconds.items()
+            if name != "stock"
+        },
         "report": _report(taken[-1]),
     }
 

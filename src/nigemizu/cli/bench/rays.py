@@ -109,7 +109,7 @@ def stratified_field(z: FloatArray, refractivity: FloatArray, types: Types) -> F
     from nigemizu import field
 
     column = refractivity[:, None, None]
-    return field.TrilinearVolume([0.0], [0.0], z, column, types, "extend", background="profile")
+    return field.StratifiedVolume([0.0], [0.0], z, column, types, "extend")
 
 
 def by_hand(

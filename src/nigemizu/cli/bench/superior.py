@@ -21,6 +21,7 @@ FloatArray = NDArray[np.float64]
 
 DISTANCE: Final = 40_000.0  # m
 ACCURACY: Final = 0.1  # pixel
+CHORD: Final = 0.05  # pixel, by which a tested chord may lie from the ray
 EARTH_RADIUS: Final = 6_371_000.0  # m
 EYE: Final = 10.0  # m
 PIXEL: Final = 1.5e-5  # rad; 960 of them are 0.8°, the view of a 2500 mm lens
@@ -75,8 +76,8 @@ def measure_far_view(
         ``seconds`` of building the table of shared paths and following it with a ray per pixel, and
         ``table_seconds`` of the first part; ``pixels``, ``paths`` flown for the table, ``distance`` [m],
         ``accuracy_pixels``, and ``error_pixels``: the largest displacement at the wall, seen from the eye,
-        of ``compared`` rays spread over the picture, against rays marched in double precision to a hundredth of the
-        accuracy.
+        of ``compared`` rays spread over the picture, against rays marched in double precision to a hundredth
+        of the accuracy.
 
     Notes
     -----
@@ -102,7 +103,11 @@ def measure_far_view(
     )
     surface = trace.combine(trace.ground_plane(0.0), wall(single, distance))
     # Opaque: values that the compiler does not know, as in a picture.
-    accuracy, most = dr.opaque(single.Float, angle), dr.opaque(single.UInt32, _MOST_STEPS)
+    control = {
+        "accuracy": dr.opaque(single.Float, angle),
+        "chord_tolerance": dr.opaque(single.Float, CHORD * PIXEL),
+        "max_steps": dr.opaque(single.UInt32, _MOST_STEPS),
+    }
 
     def lay() -> Any:
         return trace.share_paths(
@@ -111,19 +116,20 @@ def measure_far_view(
 
     def picture() -> tuple[Any, Any]:
         paths = lay()
-        return paths, settle(paths.follow(medium, ahead, accuracy=accuracy, max_steps=most, surface=surface))
+        return paths, settle(paths.follow(medium, ahead, surface=surface, **control))
 
     seconds = alternate({"table": lay, "picture": picture}, repeats, label="40 km", progress=progress)
     paths, end = picture()
     chosen = np.linspace(0, width * height - 1, _COMPARED).astype(np.int64)
     there = double.Array3f(np.ascontiguousarray(directions[chosen].T))
     start = double.Array3f(*eye.tolist())
-    best = settle(
-        trace.march(
-            exact, start, there, surface=trace.combine(trace.ground_plane(0.0), wall(double, distance)),
-            accuracy=_FINER * angle, max_steps=_MOST_STEPS,
-        )
-    )  # fmt: skip
+    fine: dict[str, Any] = {
+        "accuracy": _FINER * angle,
+        "chord_tolerance": _FINER * CHORD * PIXEL,
+        "max_steps": _MOST_STEPS,
+    }
+    around = trace.combine(trace.ground_plane(0.0), wall(double, distance))
+    best = settle(trace.march(exact, start, there, surface=around, **fine))
     return {
         "seconds": seconds["picture"],
         "table_seconds": seconds["table"],

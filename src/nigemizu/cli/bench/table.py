@@ -78,7 +78,9 @@ def _picture(name: str, found: dict[str, Any]) -> list[Row]:
 
 def _timed(what: str, found: dict[str, Any], key: str) -> Row:
     over = found.get(f"{key}_over_stock")
-    return Row(what, f"{found[f'{key}_seconds']:.2f} s", "" if over is None else f"{over:.2f} × Mitsuba's direct")
+    return Row(
+        what, f"{found[f'{key}_seconds']:.2f} s", "" if over is None else f"{over:.2f} × Mitsuba's direct"
+    )
 
 
 def _march(found: dict[str, Any]) -> list[Row]:
