@@ -91,8 +91,9 @@ def test_equals_path_without_air(max_depth, hide):
     assert p_spread > SIGNIFICANCE
 
 
-def test_equals_path_through_a_volume_of_index_one():
-    settings = render.Settings(tracer=Tracer(step=0.3), max_depth=5)
+@pytest.mark.parametrize("tracer", [Tracer(step=0.3), Tracer(sharing=False), Tracer()])
+def test_equals_path_through_a_volume_of_index_one(tracer):
+    settings = render.Settings(tracer=tracer, max_depth=5)
     integrator = render.integrator(still_air(), settings)
     p, p_spread, tests = least_p(scene_with(integrator), scene_with({"type": "path", "max_depth": 5}))
     assert p > threshold(tests)

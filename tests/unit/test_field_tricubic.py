@@ -130,10 +130,11 @@ def test_extended_columns_go_on_without_horizontal_gradient(
         assert np.max(np.abs(np.array(gradient).T - expected)) < tolerance
         assert np.all(np.array(gradient).T[expected == 0] == 0)
     lower, upper = np.array(cell.lower).T, np.array(cell.upper).T
-    assert np.array_equal(upper[:, 0], [np.inf, np.float32(x[0]), upper[2, 0], np.inf])
-    assert np.array_equal(lower[[0, 1, 3], 0], [x[-1], -np.inf, x[-1]])
-    assert lower[2, 1] == -np.inf
-    assert upper[3, 1] == np.inf
+    # Uneven air goes on for 20 km.
+    west, east, south, north = x[0] - 20e3, x[-1] + 20e3, y[0] - 20e3, y[-1] + 20e3
+    assert np.allclose(upper[:, 0], [east, x[0], upper[2, 0], east], rtol=1e-7)
+    assert np.allclose(lower[[0, 1, 3], 0], [x[-1], west, x[-1]], rtol=1e-7)
+    assert np.allclose([lower[2, 1], upper[3, 1]], [south, north], rtol=1e-7)
 
 
 def test_air_that_is_only_stratified_needs_no_taps() -> None:

@@ -1,40 +1,83 @@
-"""What a person is told about a picture before it is made."""
+"""What a person is told about the errors of a picture."""
 
 from __future__ import annotations
 
 import warnings
+from typing import Any
 
-import numpy as np
 import pytest
 
 from nigemizu.errors import NigemizuWarning
+from nigemizu.render.report import ErrorReport
 from nigemizu.scene import Scene
-from nigemizu.scene.rendering import warn_of_long_steps
-from nigemizu.scene.running import AirVolume
+from nigemizu.scene.rendering import warn_of_errors, warn_of_lost_rays
 
 
-def layer(gradient: float, thickness: float = 0.01) -> AirVolume:
-    """A linear layer at the ground under air of constant index."""
-    height = np.array([0.0, thickness, 5.0])
-    index = 2.7e-4 + gradient * np.minimum(height - thickness, 0.0)
-    return AirVolume(np.zeros(1), np.zeros(1), height, np.tile(index[:, None, None], (1, 2, 3)))
+def report(worst: float) -> ErrorReport:
+    return ErrorReport(worst=worst, mean=worst / 10, steps=40.0, queries=3.0, paths=500, shared=0.9)
 
 
-# In a linear layer rays are parabolas, turned over 2 θ / g: 4.5 m at half the largest angle, √(2 · 1e-5).
-@pytest.mark.parametrize(("step", "ragged"), [(4.0, True), (2.0, True), (1.0, False), (0.5, False)])
-def test_steps_too_long_for_steep_air(step: float, ragged: bool) -> None:
-    scene = Scene.load("pyramid", {"tracer.step": step})
+def told(worst: float, overrides: dict[str, Any]) -> list[str]:
+    scene = Scene.load("pyramid", {f"tracer.{key}": value for key, value in overrides.items()})
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        warn_of_long_steps(layer(gradient=1e-3), scene)
-    assert [entry.category for entry in said] == [NigemizuWarning] * ragged
-    assert all("tracer.step to" in str(entry.message) for entry in said)
+        warn_of_errors(report(worst), scene)
+    assert all(entry.category is NigemizuWarning for entry in said)
+    return [str(entry.message) for entry in said]
 
 
-def test_air_that_bends_gently_or_upwards_asks_for_no_shorter_steps() -> None:
-    scene = Scene.load("pyramid", {"tracer.step": 4.0})
+# A fixed step may err by a pixel; where an accuracy is asked for, it counts: 0.1 pixel if nothing is said.
+@pytest.mark.parametrize(
+    ("worst", "overrides", "warned"),
+    [
+        (0.099, {}, False),
+        (0.11, {}, True),
+        (0.11, {"accuracy": 0.2}, False),
+        (0.02, {"accuracy": 0.01}, True),
+        (0.9, {"step": 4.0}, False),
+        (1.1, {"step": 4.0}, True),
+        (0.9, {"step": 4.0, "accuracy": 0.01}, False),
+    ],
+)
+def test_errors_larger_than_what_was_asked_for(worst: float, overrides: dict[str, Any], warned: bool) -> None:
+    messages = told(worst, overrides)
+    assert len(messages) == warned
+    for message in messages:
+        assert f"up to {worst:.2g} pixels (mean {worst / 10:.2g})" in message
+
+
+def test_an_accuracy_in_radians_is_counted_in_pixels() -> None:
+    pixel = Scene.load("pyramid").camera.pixel_angle
+    radians = {"accuracy": 0.1 * pixel, "accuracy_unit": "radian"}
+    assert told(0.099, radians) == []
+    assert "where 0.1 were asked for" in told(0.11, radians)[0]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "remedy"),
+    [
+        ({}, "tracer.precision = 'double'"),
+        ({"sharing": False}, "set tracer.precision = 'double'"),
+        ({"precision": "double"}, "set tracer.sharing = false"),
+        ({"precision": "double", "sharing": False}, "ask for less with tracer.accuracy"),
+        ({"step": 30.0}, "shorten tracer.step"),
+    ],
+)
+def test_the_warning_names_a_remedy_that_is_left(overrides: dict[str, Any], remedy: str) -> None:
+    (message,) = told(5.0, overrides)
+    assert remedy in message
+    named = [key for key in ("precision = 'double'", "sharing = false") if key in message]
+    # What is set already is no remedy.
+    assert not (overrides.get("precision") == "double" and "precision = 'double'" in named)
+    assert not (overrides.get("sharing") is False and "sharing = false" in named)
+
+
+@pytest.mark.parametrize(("lost", "warned"), [(4, False), (6, True)])
+def test_lost_rays_are_told_once_they_can_be_seen(lost: int, warned: bool) -> None:
+    """Half a per cent."""
+    scene = Scene.load("pyramid")
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        for gradient in (1e-5, 0.0, -1e-3):  # the last one is cold ground: nothing is turned back up
-            warn_of_long_steps(layer(gradient), scene)
-    assert said == []
+        warn_of_lost_rays({"hit": 500, "escaped": 500 - lost, "out-of-steps": lost}, scene)
+    assert [entry.category for entry in said] == [NigemizuWarning] * warned
+    assert all("raise tracer.max_steps" in str(entry.message) for entry in said)

@@ -216,6 +216,52 @@ def test_recorded_paths_refuse_nonsense() -> None:
         trace.record_paths(air, [0, 0, 0], [[1.0, 0.0, 0.0]], step=1.0, max_steps=10, every=0)
 
 
+def test_accuracy_or_step_and_not_both() -> None:
+    start, ahead = DOUBLE.Array3f(0, 0, 1.2), flat(DOUBLE, 0.0)
+    for given in ({}, {"accuracy": 1e-6, "step": 1.0}):
+        with pytest.raises(InputError, match="one of them"):
+            trace.march(field.Uniform(DOUBLE), start, ahead, max_steps=10, **given)
+
+
+@pytest.mark.parametrize("types", [SINGLE, DOUBLE], ids=["single", "double"])
+def test_one_ray_of_numbers_that_the_compiler_knows(types: field.Types) -> None:
+    """A single ray with a component that is 0: loops must not take it for a constant."""
+    air = field.ExponentialSquare(types, 1.00027**2, 5e-5, 0.1)
+    options: dict[str, Any] = {"accuracy": 1e-6, "max_steps": 1000, "max_distance": 300.0}
+    one = trace.march(air, types.Array3f(0, 0, 1.2), types.Array3f(1.0, 0, 0), **options)
+    array = trace.march(air, types.Array3f(0, 0, 1.2), flat(types, 0.0, 0.0), **options)
+    assert status(one) == [trace.STOPPED]
+    assert float(one.position.z[0]) == float(array.position.z[1])
+
+
+@pytest.mark.parametrize("types", [SINGLE, DOUBLE], ids=["single", "double"])
+def test_cold_ground_in_a_cell_without_a_floor(types: field.Types) -> None:
+    """Light is pulled down where the lowest cell goes on for ever: its face is never met, no step fails."""
+    z = np.linspace(0.0, 4.0, 21)
+    data = np.broadcast_to((2.7e-4 + 1e-5 * np.exp(-z))[:, None, None], (21, 2, 2))
+    air = field.Bottomless(field.StratifiedVolume([0, 600], [-10, 10], z, data, types))
+    end = trace.march(
+        air, types.Array3f(0, 0, 0.5), flat(types, -0.004, -0.05, 0.0), accuracy=1e-6, max_steps=1000
+    )
+    assert status(end) == [trace.ESCAPED] * 3
+    assert np.all(np.array(end.steps) < 200)
+    assert np.all(np.array(end.direction.z) < [-0.004, -0.05, 0.0])
+
+
+def test_a_first_step_that_is_rejected_leaves_the_ray_in_the_volume() -> None:
+    """Rays that come from outside begin on the face, by rounding on either side of it."""
+    z = np.linspace(0.0, 4.0, 41)
+    data = np.broadcast_to((2.7e-4 - 2.5e-5 * np.exp(-z / 0.3))[:, None, None], (41, 2, 2))
+    air = field.StratifiedVolume([0.1, 600.1], [-10, 10], z, data, DOUBLE)
+    rng = np.random.default_rng(np.random.SeedSequence(5))
+    start = np.stack([-rng.uniform(1, 50, 200), 0 * np.ones(200), rng.uniform(0.2, 1.0, 200)])
+    rise = rng.uniform(0, 1e-3, 200)
+    end = trace.march(air, DOUBLE.Array3f(start), flat(DOUBLE, *rise), accuracy=1e-9, max_steps=5000)
+    assert np.all(np.array(end.steps) > 5)
+    assert np.all(np.array(end.position.x) > 600)
+    assert np.all(np.array(end.direction.z) > rise + 1e-6)  # all of them were bent
+
+
 def test_statuses_speak() -> None:
     assert trace.RayStatus.OUT_OF_STEPS.label == "out-of-steps"
     assert "max_steps" in trace.RayStatus.OUT_OF_STEPS.message
@@ -236,7 +282,11 @@ def test_tracer_describes_every_field_and_refuses_nonsense() -> None:
     from pydantic import ValidationError
 
     tracer = trace.Tracer()
-    assert (tracer.method, tracer.step, tracer.max_steps) == ("bent", 1.0, 5000)
+    assert (tracer.method, tracer.accuracy, tracer.accuracy_unit) == ("bent", 0.1, "pixel")
+    assert (tracer.step, tracer.max_steps, tracer.sharing) == (None, 20_000, True)
+    assert (tracer.interpolation, tracer.precision) == ("stratified", "auto")
+    assert tracer.angle(2e-4) == pytest.approx(2e-5, rel=1e-12)
+    assert trace.Tracer(accuracy=1e-6, accuracy_unit="radian").angle(2e-4) == 1e-6
     assert all(info.description for info in trace.Tracer.model_fields.values())
     for bad in (
         {"step": 0},
@@ -244,6 +294,12 @@ def test_tracer_describes_every_field_and_refuses_nonsense() -> None:
         {"method": "curved"},
         {"stepper": "rk4"},
         {"chord_tolerance": -1},
+        {"accuracy": 0},
+        {"accuracy": -0.1},
+        {"accuracy_unit": "degree"},
+        {"interpolation": "nearest"},
+        {"precision": "half"},
+        {"sharing": "sometimes"},
     ):
         with pytest.raises(ValidationError):
             trace.Tracer.model_validate(bad)

@@ -37,6 +37,7 @@ SHARES = {
     "Masonry.contrast",
     "Sand.contrast",
     "Texture.repeat",
+    "Tracer.accuracy",  # in pixels or radians, as Tracer.accuracy_unit says
     "Tracer.chord_tolerance",  # of a pixel
     "Wind.exponent",
 }

@@ -173,6 +173,9 @@ class ControlledSteps(StepRule):
         turning = flight.turning
         if self.details:
             turning = dr.minimum(turning, dr.select(passes, _lowest(flight, tried), dr.inf))
+        else:
+            # Nobody asks for turns: the least height of all steps' ends is kept in the same place.
+            turning = dr.minimum(turning, position.z)
         made = dr.select(passes, type(flight.steps)(1), type(flight.steps)(0))
         return Flight(
             position=position,

@@ -285,11 +285,14 @@ def _places(
 @dataclass(frozen=True)
 class Flown:
     """States (6, stops, rays) as offsets from the straight rays [m] and deflections [1], in the view's frame;
-    which rays were lost, and the steps of all together."""
+    which rays had left the volume at their last stop, which were lost, the steps of all together, and the
+    least height of each [m]."""
 
     states: Array
+    outside: NDArray[np.bool_]
     lost: NDArray[np.bool_]
     steps: float
+    lowest: Array
 
 
 def fly_places(
@@ -326,7 +329,8 @@ def fly_places(
     states = np.stack([np.asarray(part) for part in (*offset, *deflection)]).reshape(6, stops, rays)
     lost = np.asarray(records.lost).reshape(stops, rays)[-1] > 0
     steps = float(np.asarray(records.steps).reshape(stops, rays)[-1].sum(dtype=np.float64))
-    return Flown(states, lost, steps)
+    outside = np.asarray(records.outside).reshape(stops, rays)[-1] > 0
+    return Flown(states, outside, lost, steps, np.asarray(records.lowest).reshape(stops, rays)[-1])
 
 
 @functools.cache

@@ -25,6 +25,7 @@ _BETWEEN: Final = 0.25  # of the spread of a block's corners, by which rays betw
 _AHEAD: Final = 0.15  # of the spread of the corners' own contacts, by which a segment begins before them
 _DEEP: Final = 0.05  # m below the ground, from where the rays of a block are all given up
 _LEAST_MARGIN: Final = 1e-4  # m
+_APART: Final = 1.5  # largest ratio of the corners' contacts of which that is enough
 _MANY: Final = 1 << 30  # in place of the number of a box, where there are several
 
 
@@ -111,8 +112,10 @@ def scout(
     gone = np.asarray(records.outside, dtype=bool).reshape(_STATIONS, -1) | (height < floor - _DEEP)
     outside = gone[:, corners].all(axis=2)
     lost = np.any(np.asarray(records.lost, dtype=bool).reshape(_STATIONS, -1)[-1][corners], axis=1)
-    # The first station behind which all four corners fly straight, or are lost to light; else the last one.
-    exits = np.where(outside.any(axis=0), outside.argmax(axis=0), _STATIONS - 1)
+    # One behind the first station from which all four corners fly straight, or are lost to light: rays
+    # between them may be bent a little longer.
+    exits = np.where(outside.any(axis=0), outside.argmax(axis=0) + 1, _STATIONS - 1)
+    exits = np.minimum(exits, _STATIONS - 1)
     last = s[1:][exits]
     contacts = _contacts(field, view, boxes, records, offsets, corners, s, accuracy)
     start, end, count = _join(contacts, last)
@@ -337,7 +340,8 @@ def _join(contacts: _Contacts, last: FloatArray) -> tuple[FloatArray, FloatArray
     start, stop, corner, box = start[:, :most], stop[:, :most], corner[:, :most], box[:, :most]
     # The corners' own contacts where there is one box that all four of them meet.
     earliest, latest = corner.min(axis=2), corner.max(axis=2)
-    own = (box != _MANY) & np.isfinite(latest)
+    # and where these are not too far apart for the plane through them: towards grazing they grow like 1/θ.
+    own = (box != _MANY) & np.isfinite(latest) & (latest <= _APART * earliest)
     with np.errstate(invalid="ignore"):
         ahead = np.maximum(corner - _AHEAD * (latest - earliest)[..., None], start[..., None])
     return np.where(own[..., None], ahead, start[..., None]), stop, count

@@ -85,14 +85,14 @@ class SharedPaths:
         length = (segments.end - segments.start.min(axis=2)) / np.maximum(segments.end, 1.0)
         long = (length > _SHORT) & (np.arange(length.shape[1]) < segments.count[:, None])
         self.short = bool(long.mean() <= _FEW)
-        self._start = Float(segments.start.ravel())
+        self._start = types.table(segments.start)
         self._end = Float(segments.end.ravel())
         self._last = Float(segments.last)
         self._count = UInt32(segments.count)
         self._looks = types.Bool(segments.looks)
         self._base = UInt32(table.base)
         self._cells = [UInt32(np.ascontiguousarray(count)) for count in table.cells.T]
-        self._records = Float(table.records)
+        self._records = types.table(table.records)
         self._eye = [dr.opaque(Float, float(place)) for place in view.eye]
         self.report = SharingReport(
             paths=table.flown + (segments.columns + 1) * (segments.rows + 1),

@@ -16,8 +16,9 @@ from nigemizu.trace.view import View, types_of
 __all__ = ["grounded", "share_paths"]
 
 _SHARING: Final = 0.8  # of the accuracy that sharing may use up
+_FAR: Final = 0.5  # of the median exit: blocks that are left sooner are not tested either
 _QUIET: Final = 0.02  # of the accuracy: blocks whose error is estimated smaller are not tested
-_TESTS: Final = 4  # rays in each of the others
+_TESTS: Final = (4, 512, 8192)  # rays in each of the others: at least, at most, and in all of them together
 _R2: Final = (0.7548776662466927, 0.5698402909980532)  # steps of Roberts' sequence, which spreads evenly
 _END_OF_GROUND: Final = 1e5  # m
 
@@ -77,7 +78,7 @@ def share_paths(
         rays=rays * BLOCK[0] * BLOCK[1],
     )
     paths = SharedPaths(types or field.types, view, segments, table)
-    paths.withdraw(_wrong_blocks(field, view, segments, table, paths, accuracy, integration, max_steps))
+    paths.withdraw(_wrong_blocks(field, view, segments, table, paths, accuracy, integration, max_steps, floor))
     return paths
 
 
@@ -90,23 +91,33 @@ def _wrong_blocks(
     accuracy: float,
     integration: float,
     max_steps: int,
+    floor: float,
 ) -> NDArray[np.intp]:
     """Blocks in which a few rays between the nodes, flown for the purpose, differ too much from the table.
 
     What the grids' own comparison cannot see: a kink between two nodes.
     """
-    blocks = np.flatnonzero((table.cells[:, 0] > 0) & (table.error > _QUIET * accuracy))
+    far = segments.last > _FAR * np.median(segments.last)
+    blocks = np.flatnonzero((table.cells[:, 0] > 0) & ((table.error > _QUIET * accuracy) | far))
     if not len(blocks):
         return blocks
     row, column = np.divmod(blocks, segments.columns)
-    u, v = ((0.5 + np.arange(1, _TESTS + 1)[:, None] * step) % 1.0 for step in _R2)
+    fewest, most, together = _TESTS
+    tests = max(fewest, min(most, together // len(blocks)))
+    u, v = ((0.5 + np.arange(1, tests + 1)[:, None] * step) % 1.0 for step in _R2)
     x, y = ((column + u) * BLOCK[0]).ravel(), ((row + v) * BLOCK[1]).ravel()
-    lengths = np.tile(segments.last[blocks], _TESTS)[None]
-    flown = fly_places(field, view, x, y, lengths, integration, max_steps).states[:, 0].astype(np.float64)
-    read = paths.last_states(types_of(paths.types, view.directions(x, y)))
-    wrong = np.abs(flown - read)
+    lengths = np.tile(segments.last[blocks], tests)[None]
+    flown = fly_places(field, view, x, y, lengths, integration, max_steps)
+    states = flown.states[:, 0].astype(np.float64)
+    wrong = np.abs(states - paths.last_states(types_of(paths.types, view.directions(x, y))))
     offset, deflection = (np.linalg.norm(wrong[i : i + 3], axis=0) for i in (0, 3))
-    displaced = np.maximum(offset / np.maximum(lengths[0], 1.0), deflection).reshape(_TESTS, -1).max(axis=0)
+    displaced = np.maximum(offset / np.maximum(lengths[0], 1.0), deflection)
+    # A ray that is bent further on than the corners of its block is no part of the table either. One that
+    # has been below the ground has met it.
+    ends = flown.lowest < floor
+    displaced[~flown.outside & ~ends] = np.inf
+    displaced[ends] = 0
+    displaced = displaced.reshape(tests, -1).max(axis=0)
     return np.asarray(blocks[displaced > accuracy])
 
 

@@ -51,6 +51,7 @@ class _Records:
     outside: Any  #    UInt32         1 where the ray has left the volume, or never met it
     lost: Any  #       UInt32         1 where it has used up its steps
     steps: Any  #      UInt32         steps made so far
+    lowest: Any  #     Float      m   least height at the end of a step so far; infinite before the first
 
 
 def fly(
@@ -86,6 +87,7 @@ def fly(
         outside=dr.opaque(UInt32, 0, shape=size),
         lost=dr.opaque(UInt32, 0, shape=size),
         steps=dr.opaque(UInt32, 0, shape=size),
+        lowest=dr.opaque(Float, 0, shape=size),
     )
     _fly(field, accuracy, UInt32(max_steps), flight, stations, records)
     return records
@@ -133,3 +135,4 @@ def _write(records: _Records, index: Any, flight: Flight, limit: Any, max_steps:
     lost = flight.inside & (flight.steps >= max_steps)
     dr.scatter(records.lost, dr.select(lost, one, 0), index)
     dr.scatter(records.steps, flight.steps, index)
+    dr.scatter(records.lowest, flight.turning, index)

@@ -26,7 +26,7 @@ class Flight:
     momentum: Any  #     Array3f  1    p, |p| = n
     path: Any  #         Float    m    ∫ ds so far
     optical: Any  #      Float    m    ∫ n ds so far
-    turning: Any  #      Float    m    least height of an upward turn; infinite before the first
+    turning: Any  #      Float    m    least height of an upward turn (without details: of a step's end)
     steps: Any  #        UInt32   1    steps made, rejected ones included
     inside: Any  #       Bool          still in the volume
     trial: Any  #        Float    m    interval of σ to be tried next (controlled steps)
