@@ -124,11 +124,8 @@ def road(interpolation: str, count: int) -> Case:
         if interpolation == "tricubic":
             return field.TricubicVolume(x, y, edges, refractivity, types, "extend")
         # over the whole way, a gradient that is wrong by this displaces a ray by half the accuracy
-        options = {"flatness": accuracy / DISTANCE, "background": "profile"}
-        stratified = interpolation == "stratified"
-        return field.TrilinearVolume(
-            x, y, edges, refractivity, types, "extend", **(options if stratified else {})
-        )
+        volume = field.StratifiedVolume if interpolation == "stratified" else field.TrilinearVolume
+        return volume(x, y, edges, refractivity, types, "extend", flatness=accuracy / DISTANCE)
 
     return Case(ROAD.format(interpolation), make, elevations, by_scipy(elevations))
 

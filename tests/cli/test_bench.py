@@ -23,6 +23,8 @@ Results = dict[str, Any]
 TINY = Sizes(
     picture=(96, 54),
     samples=1,
+    road_picture=(96, 54),
+    road_samples=1,
     road=(32, 16, 24),
     march=Voxels((16, 16, 32)),
     rays=256,
@@ -35,6 +37,7 @@ TINY = Sizes(
     frames=1,
     growth=(24, 14),
     growth_samples=1,
+    growth_road_picture=(24, 14),
     growth_road=(16, 8, 24),
     memory=(16, 16, 16),
     often=1,
@@ -93,7 +96,7 @@ def test_every_number_is_finite_and_what_must_be_positive_is(results: Results) -
 def test_ratios_are_those_of_the_times_beside_them(results: Results) -> None:
     for name in ("pyramid", "road"):
         picture = results[name]
-        for method in ("bent", "straight"):
+        for method in ("bent", "straight", "bent_alike", "straight_alike"):
             ratio = picture[f"{method}_seconds"] / picture["stock_seconds"]
             assert picture[f"{method}_over_stock"] == pytest.approx(ratio)
     rays = results["ray_by_ray"]
@@ -111,6 +114,14 @@ def test_the_methods_are_compared_at_errors_that_they_keep(results: Results) -> 
     errors = list(panes["errors_pixels"].values())
     assert list(panes["errors_pixels"]) == ["64", "128", "256", "512"]
     assert errors[0] > 2 * errors[-1]
+
+
+def test_the_far_view_is_as_exact_as_it_says(results: Results) -> None:
+    far = results["stratified"]
+    assert far["table_seconds"] < far["seconds"]
+    assert far["paths"] < 10 * TINY.far[1] + 1000  # for all columns of pixels together
+    assert far["compared"] > 10
+    assert far["error_pixels"] < far["accuracy_pixels"] == 0.1
 
 
 def test_json_is_valid_and_holds_everything(results: Results) -> None:

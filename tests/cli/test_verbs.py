@@ -138,7 +138,8 @@ def test_steps_too_long_for_the_air_are_told_once(run: Run, small: tuple[str, ..
     name = "film.mp4" if verb == "animate" else "picture.png"
     done = run(verb, "road", "-o", name, "--set=tracer.step=50", "--set=film.frames=2", *small)
     assert (done.code, done.out) == (0, f"{name}\n")
-    assert done.err.startswith("nigemizu: warning: the air turns light back within ")
+    assert done.err.startswith("nigemizu: warning: what is seen is displaced by up to ")
+    assert "shorten tracer.step" in done.err
     assert len(done.err.splitlines()) == 1
 
 

@@ -218,7 +218,7 @@ def measure_growth(
     Parameters
     ----------
     pyramid : Scene
-        The smallest picture; others have four times its pixels or samples.
+        The smallest picture of its air; others have four times its pixels or samples.
     air : AirVolume
         The pyramid's.
     road : Scene

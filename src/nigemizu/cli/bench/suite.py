@@ -45,7 +45,6 @@ BENCHMARKS: Final = (
     "memory",
 )
 """In the order in which they run."""
-_SCENES: Final = ("pyramid", "road")
 _PACKAGES: Final = ("mitsuba", "drjit", "numpy", "scipy", "numba")
 
 
@@ -56,7 +55,7 @@ class Sizes:
 
     Attributes
     ----------
-    picture, film, growth : (int, int)
+    picture, road_picture, film, growth, growth_road_picture : (int, int)
         Width and height in pixels.
     samples, road_samples, growth_samples : int
         Rays per pixel.
@@ -82,6 +81,7 @@ class Sizes:
 
     picture: tuple[int, int] = (960, 540)
     samples: int = 16
+    road_picture: tuple[int, int] = (640, 360)
     road_samples: int = 4
     road: Nodes = (512, 128, 64)
     march: Voxels = FLAT
@@ -92,9 +92,10 @@ class Sizes:
     by_scipy: int = 20
     heat: Nodes = (256, 128, 96)
     film: tuple[int, int] = (480, 270)
-    frames: int = 4
-    growth: tuple[int, int] = (480, 270)
+    frames: int = 3
+    growth: tuple[int, int] = (640, 360)
     growth_samples: int = 4
+    growth_road_picture: tuple[int, int] = (320, 180)
     growth_road: Nodes = (256, 64, 32)
     memory: Nodes = (256, 192, 256)
     often: int = OFTEN
@@ -164,7 +165,7 @@ class _Suite:
 
     def road(self, progress: ProgressMeter) -> dict[str, Any]:
         sizes = self._sizes
-        scene = sizes.scene("road", sizes.picture, sizes.road_samples)
+        scene = sizes.scene("road", sizes.road_picture, sizes.road_samples)
         air = fluctuating_road(scene, sizes.road)
         return measure_picture(scene, air, sizes.seldom, label="road", progress=progress)
 
@@ -191,7 +192,8 @@ class _Suite:
 
     def growth(self, progress: ProgressMeter) -> dict[str, Any]:
         sizes = self._sizes
-        pyramid, road = (sizes.scene(name, sizes.growth, sizes.growth_samples) for name in _SCENES)
+        pyramid = sizes.scene("pyramid", sizes.growth, sizes.growth_samples)
+        road = sizes.scene("road", sizes.growth_road_picture, sizes.growth_samples)
         air = self._pyramid_air
         return measure_growth(pyramid, air, road, sizes.growth_road, sizes.seldom, progress=progress)
 

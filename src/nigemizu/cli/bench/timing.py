@@ -11,9 +11,9 @@ from nigemizu.progress import SILENT, ProgressMeter
 
 __all__ = ["OFTEN", "SELDOM", "alternate", "exponent"]
 
-OFTEN = 5
+OFTEN = 4
 """Rounds of which the median counts."""
-SELDOM = 3
+SELDOM = 2
 """The same for what takes seconds."""
 
 
