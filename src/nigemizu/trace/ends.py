@@ -83,6 +83,8 @@ class RayEnd:
         steps and panes.
     queries : UInt32 or None
         Straight pieces that were tested against the surface.
+    trial : Float or None, m
+        Interval of σ that a controlled step would have tried next.
     mark : object or None
         What the surface says of the hit, where it says more than its distance.
     """
@@ -101,6 +103,7 @@ class RayEnd:
     error: Any = None
     queries: Any = None
     mark: Any = None
+    trial: Any = None
 
     @property
     def hit(self) -> Any:

@@ -34,6 +34,7 @@ def march(
     travelled: Any = 0.0,
     max_distance: Any = None,
     cellwise: bool = True,
+    trial: Any = FIRST_TRIAL,
     details: bool = False,
     bends: Any = True,
     active: Any = True,
@@ -68,6 +69,8 @@ def march(
         Path length at which a ray stops; the last step is shortened to it.
     cellwise : bool
         Whether controlled steps end at the faces of cells (`ControlledSteps`).
+    trial : Float, m
+        Interval of σ that controlled steps try first.
     details : bool
         Also sum the optical path and look for turning points.
     bends : Bool
@@ -135,7 +138,7 @@ def march(
 
     # ---- bent inside
     x = Array3f(dr.fma(d, start, origin))
-    flight = Flight.begin(field, x, d, start, enters, FIRST_TRIAL)
+    flight = Flight.begin(field, x, d, start, enters, trial)
     flight = replace(flight, path=flight.path + before)
     options = {
         "max_steps": UInt32(max_steps),
@@ -189,6 +192,7 @@ def march(
         error=flight.error if step is None else None,
         queries=queries,
         mark=chord.mark,
+        trial=flight.trial,
     )
 
 

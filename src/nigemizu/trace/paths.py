@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from nigemizu.errors import InputError
 from nigemizu.field import Field
+from nigemizu.trace.controlled import FIRST_TRIAL
 from nigemizu.trace.ends import OUT_OF_STEPS, RayEnd
 from nigemizu.trace.march import march
 from nigemizu.trace.steppers import LEAPFROG, Stepper
@@ -83,6 +84,8 @@ def record_paths(
             surface=surface,
             chord_tolerance=chord_tolerance,
             travelled=0.0 if total is None else total.path_length,
+            # A piece of few steps must not begin with one that is too long again and again.
+            trial=FIRST_TRIAL if total is None else total.trial,
             max_distance=max_distance,
             details=True,
             active=types.Bool(flying),

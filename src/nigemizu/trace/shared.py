@@ -266,6 +266,7 @@ class SharedPaths:
             error=Float(0),
             queries=UInt32(0),
             mark=blank,
+            trial=Float(0),
         )
 
 

@@ -78,7 +78,9 @@ def share_paths(
         rays=rays * BLOCK[0] * BLOCK[1],
     )
     paths = SharedPaths(types or field.types, view, segments, table)
-    paths.withdraw(_wrong_blocks(field, view, segments, table, paths, accuracy, integration, max_steps, floor))
+    paths.withdraw(
+        _wrong_blocks(field, view, segments, table, paths, accuracy, integration, max_steps, floor)
+    )
     return paths
 
 

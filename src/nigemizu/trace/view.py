@@ -81,7 +81,9 @@ class ElevationView(View):
         return np.stack([np.cos(elevation), np.zeros_like(elevation), np.sin(elevation)], axis=-1)
 
     def locate(self, direction: Any) -> tuple[Any, Any]:
-        elevation = dr.atan2(direction.z, dr.sqrt(dr.fma(direction.x, direction.x, direction.y * direction.y)))
+        elevation = dr.atan2(
+            direction.z, dr.sqrt(dr.fma(direction.x, direction.x, direction.y * direction.y))
+        )
         Float = type(elevation)
         # Opaque: a camera that tilts does not compile the kernel again.
         high, per_pixel = dr.opaque(Float, self._high), dr.opaque(Float, 1 / self.pixel_angle)
