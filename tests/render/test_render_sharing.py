@@ -51,10 +51,11 @@ def scene(tracer, **options):
 @functools.cache
 def seen(sharing, excess=25.0):
     """Block means (8 × 8 pixels) of independent renderings, their statuses and the report of the last."""
-    made = scene(Tracer(sharing=sharing), excess=excess)
+    # So exact that what the displacement of edges adds to a block's mean is below the noise.
+    made = scene(Tracer(sharing=sharing, accuracy=0.005), excess=excess)
     found, statuses = [], []
     for frame in range(RENDERINGS):
-        seed = 3 if sharing else 4
+        seed = 5 if sharing else 6
         taken = render.picture(made, samples=SAMPLES, seed=seed, frame=frame)
         found.append(taken.radiance.reshape(5, 8, 8, 8, 3).mean(axis=(1, 3)).ravel())
         statuses.append(list(taken.statuses.values()))

@@ -60,10 +60,8 @@ class Scene(Value):
         Boundaries of the air.
     diffusivity, wind : Diffusivity, Wind
         How heat spreads and is carried.
-    time, film : TimeSpec, FilmSpec
-        What is simulated, and what a film shows.
-    tracer : Tracer
-        How rays are followed.
+    time, film, tracer : TimeSpec, FilmSpec, Tracer
+        What is simulated, what a film shows, and how rays are followed.
     camera, light : Camera, Light
         The eye, and sun and sky.
     objects : tuple of Object
@@ -322,8 +320,7 @@ class Scene(Value):
         command : str
             Kept in the film's header: how it was made.
         tell : callable, optional
-            ``tell(statuses, report)`` is called with the camera rays by status and the joined error report
-            (None where no light is bent) of the frames that were rendered.
+            Called as ``tell(statuses, report)``: camera rays by status, the joined error report.
 
         Returns
         -------

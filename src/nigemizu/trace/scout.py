@@ -21,7 +21,8 @@ BLOCK: Final = (16, 8)  # pixels across and down; air is layered, and so is its 
 MOST_SEGMENTS: Final = 6  # per block; what is more is joined
 _STATIONS: Final = 64  # along a ray, their distances growing by a constant factor
 _FIRST_STATION: Final = 5.0  # m
-_BETWEEN: Final = 0.25  # of the spread of a block's corners, by which rays between them may leave it
+_BETWEEN: Final = 0.5  # of the spread of a block's corners, by which rays between them may leave it
+_DOWN: Final = 8  # rows of scouts in a block: where images fold, some between pass lower than its corners
 _AHEAD: Final = 0.15  # of the spread of the corners' own contacts, by which a segment begins before them
 _DEEP: Final = 0.05  # m below the ground, from where the rays of a block are all given up
 _LEAST_MARGIN: Final = 1e-4  # m
@@ -94,8 +95,8 @@ def scout(
 
     Notes
     -----
-    Between two stations the four corners of a block sweep a box whose faces move linearly, widened by how
-    far the bent paths stray from their chords, by a quarter of its own width (for the rays between the
+    Between two stations the scouts of a block, its corners and some down its sides, sweep a box whose faces move linearly, widened by how
+    far the bent paths stray from their chords, by half of its own width (for the rays between the
     corners) and by the accuracy. The interval in which it overlaps an object's box is found in closed form.
     Where there is one box only, which all four corners' rays meet, as on a flat ground, the segment begins
     at each corner where its own ray comes near, a little earlier for what lies between them.
@@ -105,7 +106,8 @@ def scout(
     """
     columns, rows = (max(1, int(np.ceil(n / size))) for n, size in zip(view.size, BLOCK, strict=True))
     s = np.concatenate([[0.0], np.geomspace(min(_FIRST_STATION, farthest / 2), farthest, _STATIONS)])
-    y, x = np.meshgrid(np.arange(rows + 1.0) * BLOCK[1], np.arange(columns + 1.0) * BLOCK[0], indexing="ij")
+    down = np.arange(_DOWN * rows + 1.0) * (BLOCK[1] / _DOWN)
+    y, x = np.meshgrid(down, np.arange(columns + 1.0) * BLOCK[0], indexing="ij")
     records, offsets = _fly_corners(field, view, x.ravel(), y.ravel(), s[1:], accuracy, max_steps)
     corners = _corners(columns, rows)
     height = np.asarray(offsets[2]).reshape(_STATIONS, -1) + view.eye[2]
@@ -186,9 +188,11 @@ def _fly_corners(
 
 
 def _corners(columns: int, rows: int) -> NDArray[np.int64]:
-    """Numbers (B, 4) of the four lattice points about each block."""
-    first = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
-    return np.stack([first, first + 1, first + columns + 1, first + columns + 2], axis=1)
+    """Numbers (B, 2 * _DOWN + 2) of the lattice points on the left and right of each block, its four corners
+    first, from above."""
+    first = (_DOWN * np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    order = [0, _DOWN, *range(1, _DOWN)]
+    return np.stack([first + row * (columns + 1) + side for row in order for side in (0, 1)], axis=1)
 
 
 def _contacts(
@@ -210,14 +214,14 @@ def _contacts(
     blocks, rays, intervals = len(corners), offsets[0].shape[0] // (len(s) - 1), len(s) - 1
     lane = dr.arange(UInt32, blocks * intervals)
     interval, block = lane // blocks, lane % blocks
-    four = [dr.gather(UInt32, UInt32(np.ascontiguousarray(corner)), block) for corner in corners.T]
+    about = [dr.gather(UInt32, UInt32(np.ascontiguousarray(corner)), block) for corner in corners.T]
     lengths = Float(s)
     s0, s1 = dr.gather(Float, lengths, interval), dr.gather(Float, lengths, interval + 1)
-    index = [interval * rays + corner for corner in four]
+    index = [interval * rays + corner for corner in about]
     strays = [dr.gather(Float, records.stray, i) for i in index]
     stray = _reduce(dr.maximum, strays)
     whole: list[Any] = []
-    own: list[list[Any]] = [[] for _ in four]
+    own: list[list[Any]] = [[] for _ in range(4)]
     for offset in offsets:
         far = [dr.gather(Float, offset, i) for i in index]
         # At the eye all rays are in one point.
@@ -228,7 +232,7 @@ def _contacts(
             margin = dr.fma(high - low, _BETWEEN, dr.fma(length, accuracy, stray)) + _LEAST_MARGIN
             ends += [low - margin, high + margin]
         whole.append((ends[0], ends[2], ends[1], ends[3]))
-        for number, (begin, end) in enumerate(zip(near, far, strict=True)):
+        for number, (begin, end) in enumerate(zip(near[:4], far[:4], strict=True)):
             margin = dr.fma(s1, accuracy, strays[number]) + _LEAST_MARGIN
             own[number].append((begin - margin, end - margin, begin + margin, end + margin))
     if not len(boxes):

@@ -65,9 +65,10 @@ def measure_picture(
     too, and are timed like it, from camera to radiance; the bent one lays its shared paths anew each time.
     """
     import drjit as dr
-    import mitsuba as mi
 
+    from nigemizu import field
     from nigemizu.render import build
+    from nigemizu.render.variant import current_backend
     from nigemizu.scene.rendering import Studio
 
     studio, camera = Studio(scene, VARIANT), scene.camera
@@ -77,7 +78,7 @@ def measure_picture(
     taken: list[RenderedPicture] = []
 
     def radiance(integrator: Any) -> None:
-        seed = dr.opaque(mi.UInt32, camera.seed)
+        seed = dr.opaque(field.types(current_backend(), differentiable=True).UInt32, camera.seed)
         dr.eval(integrator.render(built, built.sensors()[0], seed=seed, spp=camera.samples))
         dr.sync_thread()
 

@@ -11,7 +11,7 @@ from nigemizu.progress import SILENT, ProgressMeter
 
 __all__ = ["OFTEN", "SELDOM", "alternate", "exponent"]
 
-OFTEN = 4
+OFTEN = 3
 """Rounds of which the median counts."""
 SELDOM = 2
 """The same for what takes seconds."""
