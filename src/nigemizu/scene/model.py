@@ -56,10 +56,8 @@ class Scene(Value):
         The mesh of the air.
     initial : Initial
         Temperature at the beginning.
-    ground, sides, top : GroundBoundary, Sides, Top
-        Boundaries of the air.
-    diffusivity, wind : Diffusivity, Wind
-        How heat spreads and is carried.
+    ground, sides, top, diffusivity, wind : GroundBoundary, Sides, Top, Diffusivity, Wind
+        Boundaries of the air, and how heat spreads and is carried.
     time, film, tracer : TimeSpec, FilmSpec, Tracer
         What is simulated, what a film shows, and how rays are followed.
     camera, light : Camera, Light

@@ -95,7 +95,8 @@ def scout(
 
     Notes
     -----
-    Between two stations the scouts of a block, its corners and some down its sides, sweep a box whose faces move linearly, widened by how
+    Between two stations the scouts of a block, its corners and some down its sides, sweep a box whose
+    faces move linearly, widened by how
     far the bent paths stray from their chords, by half of its own width (for the rays between the
     corners) and by the accuracy. The interval in which it overlaps an object's box is found in closed form.
     Where there is one box only, which all four corners' rays meet, as on a flat ground, the segment begins
