@@ -22,7 +22,7 @@ scene = mi.load_dict(
             "air": "hot_air.nc",
             "time": 300.0,
             "beyond": "extend",
-            "step": 4.0,
+            "accuracy": 0.1,
         },
         "sensor": {
             "type": "perspective",
