@@ -101,3 +101,24 @@ def test_interrupted_picture_leaves_nothing(program: Program, tmp_path: Path) ->
     out, err = _interrupt(process, lambda: time.monotonic() - began > 4)
     assert (process.returncode, out, err) == (130, "", "nigemizu: interrupted\n")
     assert list((tmp_path / "there").iterdir()) == []
+
+
+@pytest.mark.parametrize(("error", "code"), [("KeyboardInterrupt", 130), ("ZeroDivisionError", 1)])
+def test_ctrl_c_is_known_inside_a_loop_that_drjit_records(error: str, code: int) -> None:
+    program = f"""
+import sys, drjit as dr
+from drjit.llvm import UInt32
+from nigemizu.cli import main, verbs
+
+def fail(count):
+    raise {error}
+
+def doctor(options):
+    dr.while_loop((UInt32(0, 1),), lambda count: count < 3, fail)
+
+verbs.doctor = doctor
+sys.exit(main(["doctor"]))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == code, done.stderr
+    assert (done.stderr == "nigemizu: interrupted\n") is (code == 130), done.stderr

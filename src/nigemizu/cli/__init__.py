@@ -50,6 +50,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _say(f"error: {place}{error.strerror or error}", 2, debug)
     except MemoryError:
         return _say("error: not enough memory; make grid.cells or camera.size smaller", 2, debug)
+    except RuntimeError as error:
+        # Dr.Jit wraps whatever is raised while it records a loop, Ctrl-C too.
+        if not _caused_by(error, KeyboardInterrupt):
+            raise
+        return _say("interrupted", 130, debug)
+
+
+def _caused_by(error: BaseException, kind: type[BaseException]) -> bool:
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, kind):
+        cause = cause.__cause__ or cause.__context__
+    return cause is not None
 
 
 def _say(text: str, code: int, debug: bool) -> int:

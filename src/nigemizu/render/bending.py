@@ -42,14 +42,10 @@ class Bending:
     def __init__(
         self, medium: Any, tracer: trace.Tracer, frame: Frame, reference: Callable[[], Any] | None = None
     ) -> None:
-        self.method = tracer.method if medium is not None else "straight"
-        self.medium = medium
         self.frame = frame
         self.tracer = tracer
-        self.paths: trace.SharedPaths | None = None
-        self._reference = reference
         self._known_boxes: tuple[Any, NDArray[np.float64]] | None = None
-        self._made_for: tuple[Any, ...] = ()
+        self.set_medium(medium, reference)
         # Opaque: values of the next frame reuse the compiled kernel.
         self._step = None if tracer.step is None else dr.opaque(mi.Float, tracer.step)
         self._max_steps = dr.opaque(mi.UInt32, tracer.max_steps)
@@ -59,9 +55,9 @@ class Bending:
         """Put other air in; of the same kind and shape it reuses the compiled kernel."""
         self.method = self.tracer.method if medium is not None else "straight"
         self.medium = medium
+        self.paths: trace.SharedPaths | None = None
         self._reference = reference
-        self.paths = None
-        self._made_for = ()
+        self._made_for: tuple[Any, ...] = ()
 
     @property
     def controlled(self) -> bool:
@@ -89,8 +85,9 @@ class Bending:
         if pinhole is None or not self.controlled or not self.tracer.sharing:
             self.paths = None
             return
+        shapes, boxes = self._shapes(scene)
         made_for = (
-            _fingerprint(scene),
+            shapes,
             pinhole.size,
             *(v.tobytes() for v in (pinhole.origin, pinhole.c0, pinhole.cu, pinhole.cv)),
         )
@@ -103,7 +100,7 @@ class Bending:
         self.paths = trace.share_paths(
             field,
             view,
-            self.boxes(scene),
+            boxes,
             accuracy=self.angle,
             max_steps=self.tracer.max_steps,
             rays=samples,
@@ -193,10 +190,14 @@ class Bending:
 
     def boxes(self, scene: Any) -> NDArray[np.float64]:
         """Boxes (N, 2, 3) that contain the scene's surfaces, in the air's axes, m."""
+        return self._shapes(scene)[1]
+
+    def _shapes(self, scene: Any) -> tuple[Any, NDArray[np.float64]]:
+        """What tells the scene's shapes from others, and their boxes, which are found once for them."""
         known = _fingerprint(scene)
         if self._known_boxes is None or self._known_boxes[0] != known:
             self._known_boxes = known, self.frame.boxes(object_boxes(scene))
-        return self._known_boxes[1]
+        return self._known_boxes
 
     def _set_pixel_angle(self, angle: float) -> None:
         self._pixel_angle = angle

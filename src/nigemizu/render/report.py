@@ -118,10 +118,8 @@ def measure(bending: Bending, scene: Any, sensor: Any) -> ErrorReport | None:
 
 
 def _spread(sensor: Any) -> Any:
-    """Rays through places spread evenly over the film (Roberts' R2 sequence)."""
-    ratio = 1.32471795724474602596
-    number = np.arange(1, _RAYS + 1)
-    u, v = (0.5 + number / ratio) % 1.0, (0.5 + number / ratio**2) % 1.0
+    """Rays through places spread evenly over the film."""
+    u, v = trace.spread(_RAYS)
     ray, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(mi.Float(u), mi.Float(v)), mi.Point2f(0.5))
     dr.eval(ray)
     return ray

@@ -9,7 +9,7 @@ from nigemizu.trace.sharing import grounded, share_paths
 from nigemizu.trace.steppers import EULER, LEAPFROG, STEPPERS, SUZUKI4, YOSHIDA4, Stepper, stepper_named
 from nigemizu.trace.surfaces import Surface, combine, ground_plane
 from nigemizu.trace.tracer import Tracer
-from nigemizu.trace.view import ElevationView, View
+from nigemizu.trace.view import ElevationView, View, spread
 
 __all__ = [
     "ESCAPED",
@@ -38,6 +38,7 @@ __all__ = [
     "march",
     "record_paths",
     "share_paths",
+    "spread",
     "stepper_named",
     "straight",
 ]

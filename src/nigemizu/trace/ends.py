@@ -105,6 +105,15 @@ class RayEnd:
     mark: Any = None
     trial: Any = None
 
+    def replaced(self, later: RayEnd, active: Any) -> RayEnd:
+        """The later end where rays are active, this one elsewhere; what either lacks is left out."""
+
+        def choose(name: str) -> Any:
+            mine, other = getattr(self, name), getattr(later, name)
+            return None if mine is None or other is None else dr.select(active, other, mine)
+
+        return RayEnd(**{name: choose(name) for name in RayEnd.__dataclass_fields__})
+
     @property
     def hit(self) -> Any:
         """Whether the ray met a surface (Bool)."""

@@ -36,7 +36,6 @@ def march(
     cellwise: bool = True,
     trial: Any = FIRST_TRIAL,
     details: bool = False,
-    bends: Any = True,
     active: Any = True,
 ) -> RayEnd:
     """March rays through a field.
@@ -73,8 +72,6 @@ def march(
         Interval of σ that controlled steps try first.
     details : bool
         Also sum the optical path and look for turning points.
-    bends : Bool
-        Rays that the field bends; the others go straight for ever.
     active : Bool
         Rays that take part.
 
@@ -132,7 +129,7 @@ def march(
 
     # ---- straight to the volume
     before = Float(travelled)
-    entry = dr.select(Bool(bends), field.entry(origin, d), dr.inf)
+    entry = field.entry(origin, d)
     enters = active & (entry < limit - before)
     start = dr.select(enters, entry, 0)
 

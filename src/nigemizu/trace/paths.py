@@ -114,12 +114,7 @@ def _joined(before: RayEnd, piece: RayEnd, active: Any) -> RayEnd:
         error=None if piece.error is None else before.error + piece.error,
         turning_height=dr.select(lowest < dr.inf, lowest, dr.nan),
     )
-
-    def choose(name: str) -> Any:
-        value = getattr(later, name)
-        return None if value is None else dr.select(active, value, getattr(before, name))
-
-    return RayEnd(**{name: choose(name) for name in RayEnd.__dataclass_fields__})
+    return before.replaced(later, active)
 
 
 def _or_infinite(height: Any) -> Any:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from nigemizu.field import Field
 from nigemizu.trace.scout import BLOCK, Segments
 from nigemizu.trace.stations import Stations, fly
-from nigemizu.trace.view import View, types_of
+from nigemizu.trace.view import View
 
 __all__ = ["RECORD", "Flown", "PathTable", "fly_places", "refine"]
 
@@ -308,8 +308,7 @@ def fly_places(
     types = field.types
     Float, UInt32 = types.Float, types.UInt32
     stops, rays = lengths.shape
-    direction = types_of(types, view.directions(x, y))
-    eye = types.Array3f(*(dr.opaque(Float, float(place)) for place in view.eye))
+    eye, direction = view.rays(types, x, y)
     lane, stride = dr.arange(UInt32, rays), dr.opaque(UInt32, rays)
     lengths = Float(np.ascontiguousarray(lengths).ravel())
     records = fly(

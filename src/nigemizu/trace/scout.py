@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from nigemizu.field import Field
 from nigemizu.trace.stations import Stations, fly
-from nigemizu.trace.view import View, types_of
+from nigemizu.trace.view import View
 
 __all__ = ["BLOCK", "Segments", "scout"]
 
@@ -52,6 +52,8 @@ class Segments:
         Whether a corner's ray ran out of steps.
     looks : (B,) bool
         Whether the straight rays can meet anything behind `last`.
+    flown : int
+        Rays that were flown to find them.
     """
 
     columns: int
@@ -62,6 +64,7 @@ class Segments:
     last: FloatArray
     lost: NDArray[np.bool_]
     looks: NDArray[np.bool_]
+    flown: int
 
 
 def scout(
@@ -74,7 +77,7 @@ def scout(
     farthest: float,
     floor: float = -np.inf,
 ) -> Segments:
-    """Fly the rays at the corners of blocks of pixels, and compare where they go with where objects are.
+    """Fly rays at the corners and down the sides of blocks of pixels, and compare their ways with objects.
 
     Parameters
     ----------
@@ -96,14 +99,14 @@ def scout(
     Notes
     -----
     Between two stations the scouts of a block, its corners and some down its sides, sweep a box whose
-    faces move linearly, widened by how
-    far the bent paths stray from their chords, by half of its own width (for the rays between the
-    corners) and by the accuracy. The interval in which it overlaps an object's box is found in closed form.
+    faces move linearly, widened by how far the bent paths stray from their chords, by half of its own
+    width (for the rays between the scouts) and by the accuracy. The interval in which it overlaps an
+    object's box is found in closed form.
     Where there is one box only, which all four corners' rays meet, as on a flat ground, the segment begins
     at each corner where its own ray comes near, a little earlier for what lies between them.
 
-    Limits: a ray between the corners that leaves the widened sweep is not looked after; the error
-    report of the shared paths would show it.
+    Limits: a ray between the scouts that leaves the widened sweep, as in a fold of the image thinner than a
+    pixel, is not looked after, and may miss what it ought to meet.
     """
     columns, rows = (max(1, int(np.ceil(n / size))) for n, size in zip(view.size, BLOCK, strict=True))
     s = np.concatenate([[0.0], np.geomspace(min(_FIRST_STATION, farthest / 2), farthest, _STATIONS)])
@@ -123,7 +126,7 @@ def scout(
     contacts = _contacts(field, view, boxes, records, offsets, corners, s, accuracy)
     start, end, count = _join(contacts, last)
     looks = np.any((contacts.end > last) & (contacts.end >= contacts.begin), axis=0)
-    return Segments(columns, rows, start, end, count, last, lost, looks)
+    return Segments(columns, rows, start, end, count, last, lost, looks, x.size)
 
 
 @final
@@ -163,8 +166,7 @@ def _fly_corners(
     types = field.types
     UInt32 = types.UInt32
     count = len(x)
-    direction = types_of(types, view.directions(x, y))
-    eye = types.Array3f(*(dr.opaque(types.Float, float(place)) for place in view.eye))
+    eye, direction = view.rays(types, x, y)
     records = fly(
         field,
         eye,

@@ -19,8 +19,8 @@ from nigemizu.trace.view import View
 
 __all__ = ["INTEGRATION", "SharedPaths", "SharingReport"]
 
-INTEGRATION: Final = 0.05  # the same of the integration: cells, not the accuracy, decide the steps
-_NEAR: Final = 0.2  # the same of the integration within a segment
+INTEGRATION: Final = 0.05  # of the accuracy, for the integration: cells, not the accuracy, decide the steps
+_NEAR: Final = 0.2  # the same within a segment
 _MOST_LEVERAGE: Final = 50.0
 _SHORT: Final = 0.3  # of the way to its end, that a segment may take up and count as short
 _FEW: Final = 0.05  # of all segments, that may be longer
@@ -95,7 +95,7 @@ class SharedPaths:
         self._records = types.table(table.records)
         self._eye = [dr.opaque(Float, float(place)) for place in view.eye]
         self.report = SharingReport(
-            paths=table.flown + (segments.columns + 1) * (segments.rows + 1),
+            paths=table.flown + segments.flown,
             steps=table.steps,
             shared=float(shared.mean()),
             error=float(table.error.max(initial=0.0)),
@@ -153,7 +153,7 @@ class SharedPaths:
             end = _test_beyond(end, far_surface or surface, looks & (end.status == ESCAPED))
         if not self.everywhere:
             single = active & ~shared
-            end = _choose(end, self._march_single(field, eye, d, place, single, options), single)
+            end = end.replaced(self._march_single(field, eye, d, place, single, options), single)
         return replace(end, status=dr.select(active, end.status, UInt32(NOT_TRACED)))
 
     def _march_single(
@@ -189,9 +189,8 @@ class SharedPaths:
     def last_states(self, direction: Any) -> NDArray[np.float64]:
         """Offset [m] and deflection where the last straight pieces begin, in the view's frame: (6, N)."""
         place = self._find(direction)
-        length = dr.gather(self.types.Float, self._last, place.block)
         offset, deflection = self._interpolated(place, self._most, True)
-        dr.eval(offset, deflection, length)
+        dr.eval(offset, deflection)
         return np.stack([np.asarray(part, dtype=np.float64) for part in (*offset, *deflection)])
 
     def _find(self, direction: Any) -> _Place:
@@ -322,19 +321,11 @@ def _segment(
 def _add(end: RayEnd, piece: RayEnd, active: Any, ends: Any) -> RayEnd:
     """The end with the piece's effort, and the piece itself where the ray ends on it."""
     return replace(
-        _choose(end, piece, ends),
+        end.replaced(piece, ends),
         steps=end.steps + dr.select(active, piece.steps, 0),
         queries=end.queries + dr.select(active, piece.queries, 0),
         error=end.error + dr.select(active, piece.error, 0),
     )
-
-
-def _choose(end: RayEnd, other: RayEnd, use: Any) -> RayEnd:
-    def choose(name: str) -> Any:
-        mine = getattr(end, name)
-        return None if mine is None else dr.select(use, getattr(other, name), mine)
-
-    return RayEnd(**{name: choose(name) for name in RayEnd.__dataclass_fields__})
 
 
 def _test_beyond(end: RayEnd, surface: Surface, active: Any) -> RayEnd:

@@ -11,7 +11,7 @@ from nigemizu.field import Bottomless, BoxedField, Field, Types
 from nigemizu.trace.refine import PathTable, fly_places, refine
 from nigemizu.trace.scout import BLOCK, Segments, scout
 from nigemizu.trace.shared import INTEGRATION, SharedPaths
-from nigemizu.trace.view import View, types_of
+from nigemizu.trace.view import View, spread
 
 __all__ = ["grounded", "share_paths"]
 
@@ -19,7 +19,6 @@ _SHARING: Final = 0.8  # of the accuracy that sharing may use up
 _FAR: Final = 0.5  # of the median exit: blocks that are left sooner are not tested either
 _QUIET: Final = 0.02  # of the accuracy: blocks whose error is estimated smaller are not tested
 _TESTS: Final = (4, 512, 8192)  # rays in each of the others: at least, at most, and in all of them together
-_R2: Final = (0.7548776662466927, 0.5698402909980532)  # steps of Roberts' sequence, which spreads evenly
 _END_OF_GROUND: Final = 1e5  # m
 
 
@@ -54,11 +53,6 @@ def share_paths(
     Returns
     -------
     SharedPaths
-
-    Raises
-    ------
-    InputError
-        Where the volume and the objects have no end.
     """
     farthest = _farthest(field, view, boxes)
     deepened = grounded(field, boxes)
@@ -106,12 +100,12 @@ def _wrong_blocks(
     row, column = np.divmod(blocks, segments.columns)
     fewest, most, together = _TESTS
     tests = max(fewest, min(most, together // len(blocks)))
-    u, v = ((0.5 + np.arange(1, tests + 1)[:, None] * step) % 1.0 for step in _R2)
-    x, y = ((column + u) * BLOCK[0]).ravel(), ((row + v) * BLOCK[1]).ravel()
+    u, v = spread(tests)
+    x, y = ((column + u[:, None]) * BLOCK[0]).ravel(), ((row + v[:, None]) * BLOCK[1]).ravel()
     lengths = np.tile(segments.last[blocks], tests)[None]
     flown = fly_places(field, view, x, y, lengths, integration, max_steps)
     states = flown.states[:, 0].astype(np.float64)
-    wrong = np.abs(states - paths.last_states(types_of(paths.types, view.directions(x, y))))
+    wrong = np.abs(states - paths.last_states(view.rays(paths.types, x, y)[1]))
     offset, deflection = (np.linalg.norm(wrong[i : i + 3], axis=0) for i in (0, 3))
     displaced = np.maximum(offset / np.maximum(lengths[0], 1.0), deflection)
     # A ray that is bent further on than the corners of its block is no part of the table either. One that

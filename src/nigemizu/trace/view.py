@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, final
+from typing import Any, Final, final
 
 import drjit as dr
 import numpy as np
@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from nigemizu.field import Types
 
-__all__ = ["ElevationView", "View"]
+__all__ = ["ElevationView", "View", "spread"]
 
 FloatArray = NDArray[np.float64]
+
+_PLASTIC: Final = 1.32471795724474602596  # the real root of x³ = x + 1
 
 
 class View(ABC):
@@ -41,6 +43,11 @@ class View(ABC):
     @abstractmethod
     def locate(self, direction: Any) -> tuple[Any, Any]:
         """Place (Float, Float) of a direction (Array3f, unit length) on the device."""
+
+    def rays(self, types: Types, x: FloatArray, y: FloatArray) -> tuple[Any, Any]:
+        """The eye, as data of the kernel, and the directions of places x, y (N,), on the device (Array3f)."""
+        eye = types.Array3f(*(dr.opaque(types.Float, float(place)) for place in self.eye))
+        return eye, types.Array3f(np.ascontiguousarray(self.directions(x, y).T))
 
     def to_frame(self, direction: Any, vector: Any) -> Any:
         """A vector (Array3f) in the axes in which offsets of this ray are kept; by default the air's."""
@@ -119,6 +126,12 @@ class ElevationView(View):
         return dr.select(steep, 1, direction.x * inverse), dr.select(steep, 0, direction.y * inverse)
 
 
-def types_of(types: Types, values: FloatArray) -> Any:
-    """(N, 3) float64 as an Array3f of the device."""
-    return types.Array3f(np.ascontiguousarray(values.T))
+def spread(count: int) -> tuple[FloatArray, FloatArray]:
+    """Places (count,), (count,) that fill the unit square evenly: the sequence R2.
+
+    References
+    ----------
+    M. Roberts (2018), The unreasonable effectiveness of quasirandom sequences.
+    """
+    number = np.arange(1, count + 1)
+    return (0.5 + number / _PLASTIC) % 1.0, (0.5 + number / _PLASTIC**2) % 1.0
