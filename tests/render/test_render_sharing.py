@@ -13,6 +13,7 @@ from scipy import stats
 
 from nigemizu import field, render
 from nigemizu.errors import NigemizuWarning
+from nigemizu.render import bending, bounds
 from nigemizu.render.report import ErrorReport
 from nigemizu.render.variant import current_backend
 from nigemizu.scene import Scene
@@ -140,19 +141,32 @@ def test_what_is_reached_is_not_warned_of():
     assert report.worst <= 0.1
 
 
+def test_objects_that_are_missed_are_reported(monkeypatch):
+    """The report looks at the scene for itself. Negative control: the scene as it is."""
+    assert small().render().report.strays == 0
+    # without the ground, which comes first
+    monkeypatch.setattr(bending, "object_boxes", lambda scene: bounds.object_boxes(scene)[1:])
+    with pytest.warns(NigemizuWarning, match="meet something else"):
+        report = small().render().report
+    assert 0.01 < report.strays < 0.5
+    assert report.worst <= 0.1
+
+
 def test_no_report_where_nothing_is_bent():
     assert small(method="straight").render().report is None
 
 
 def test_frames_of_a_film_join_their_reports():
     """The worst of all, the means of the rest; a film warns of them together."""
-    first = ErrorReport(worst=0.3, mean=0.01, steps=10.0, queries=2.0, paths=100, shared=0.5)
-    second = ErrorReport(worst=0.1, mean=0.03, steps=20.0, queries=4.0, paths=301, shared=1.0)
+    first = ErrorReport(worst=0.3, mean=0.01, strays=0.0, steps=10.0, queries=2.0, paths=100, shared=0.5)
+    second = ErrorReport(worst=0.1, mean=0.03, strays=0.02, steps=20.0, queries=4.0, paths=301, shared=1.0)
     joined = ErrorReport.joined([first, second])
-    assert joined == ErrorReport(worst=0.3, mean=0.02, steps=15.0, queries=3.0, paths=200, shared=0.75)
+    assert joined == ErrorReport(
+        worst=0.3, mean=0.02, strays=0.01, steps=15.0, queries=3.0, paths=200, shared=0.75
+    )
     assert ErrorReport.joined(iter([first])) == first
     with pytest.warns(NigemizuWarning, match=r"up to 0\.3 pixels \(mean 0\.02\)"):
-        warn_of_errors(joined, small())
+        warn_of_errors(dataclasses.replace(joined, strays=0.0), small())
     text = str(dataclasses.replace(joined, worst=0.25))
     assert "0.25 at worst" in text
     assert "75.0% of the picture" in text

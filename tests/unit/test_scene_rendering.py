@@ -13,15 +13,17 @@ from nigemizu.scene import Scene
 from nigemizu.scene.rendering import warn_of_errors, warn_of_lost_rays
 
 
-def report(worst: float) -> ErrorReport:
-    return ErrorReport(worst=worst, mean=worst / 10, steps=40.0, queries=3.0, paths=500, shared=0.9)
+def report(worst: float, strays: float = 0.0) -> ErrorReport:
+    return ErrorReport(
+        worst=worst, mean=worst / 10, strays=strays, steps=40.0, queries=3.0, paths=500, shared=0.9
+    )
 
 
-def told(worst: float, overrides: dict[str, Any]) -> list[str]:
+def told(worst: float, overrides: dict[str, Any], strays: float = 0.0) -> list[str]:
     scene = Scene.load("pyramid", {f"tracer.{key}": value for key, value in overrides.items()})
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        warn_of_errors(report(worst), scene)
+        warn_of_errors(report(worst, strays), scene)
     assert all(entry.category is NigemizuWarning for entry in said)
     return [str(entry.message) for entry in said]
 
@@ -44,6 +46,12 @@ def test_errors_larger_than_what_was_asked_for(worst: float, overrides: dict[str
     assert len(messages) == warned
     for message in messages:
         assert f"up to {worst:.2g} pixels (mean {worst / 10:.2g})" in message
+
+
+def test_rays_that_meet_something_else() -> None:
+    """One in a thousand is not worth a word: it may be an edge finer than what is looked at around it."""
+    assert told(0.01, {}, strays=0.001) == []
+    assert told(0.01, {}, strays=0.02)[0].startswith("2.00% of the rays meet something else")
 
 
 def test_an_accuracy_in_radians_is_counted_in_pixels() -> None:

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from nigemizu import field, trace
+from nigemizu.trace import shared
 from nigemizu.trace.scout import BLOCK, scout
 
 FloatArray = NDArray[np.float64]
@@ -306,6 +307,23 @@ def test_ground_that_does_not_cover_the_floor() -> None:
         paths = trace.share_paths(air, view, boxes_of.boxes, accuracy=ACCURACY, max_steps=20_000)
         assert trace.grounded(air, boxes_of.boxes) is air
         assert_alike(air, view, paths, boxes_of.surface, directions_in(view, 2000))
+
+
+def test_nothing_slips_between_the_last_segment_and_the_straight_piece_behind_it() -> None:
+    """Rays that meet the ground as near to that seam as the two pieces lie apart.
+
+    Negative control: without the look back from the beginning of the last piece some of them are lost.
+    """
+    air, scene, view = hot_air(uneven=0.2, floor=0.4), objects(*VILLAGE), Film()
+    paths = trace.share_paths(air, view, scene.boxes, accuracy=ACCURACY, max_steps=20_000)
+    rng = np.random.default_rng(np.random.SeedSequence(23))
+    x, y = rng.uniform(0, view.size[0], 20_000), rng.uniform(44.6, 44.8, 20_000)
+    directions = view.directions(x, y)
+    alone = np.array(march(air, view, scene.surface, directions).hit)
+    assert np.all(np.array(follow(paths, air, scene.surface, directions).hit) == alone)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(shared, "_SEAM", 0.0)
+        assert np.sum(np.array(follow(paths, air, scene.surface, directions).hit) != alone) > 10
 
 
 def test_a_ground_on_the_floor_continues_the_air_below() -> None:

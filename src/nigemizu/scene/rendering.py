@@ -105,6 +105,12 @@ def warn_of_errors(report: ErrorReport, scene: Scene) -> None:
             NigemizuWarning,
             stacklevel=4,
         )
+    if report.strays > _SEEN_SHARE:
+        warnings.warn(
+            f"{report.strays:.2%} of the rays meet something else than they ought to; {remedy}",
+            NigemizuWarning,
+            stacklevel=4,
+        )
 
 
 def _remedy(scene: Scene) -> str:

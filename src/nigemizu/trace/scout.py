@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 BLOCK: Final = (16, 8)  # pixels across and down; air is layered, and so is its picture
 MOST_SEGMENTS: Final = 6  # per block; what is more is joined
-_STATIONS: Final = 64  # along a ray, their distances growing by a constant factor
+_STATIONS: Final = 128  # along a ray, their distances growing by a constant factor
 _FIRST_STATION: Final = 5.0  # m
 _BETWEEN: Final = 0.5  # of the spread of a block's corners, by which rays between them may leave it
 _DOWN: Final = 8  # rows of scouts in a block: where images fold, some between pass lower than its corners
@@ -113,17 +113,17 @@ def scout(
     down = np.arange(_DOWN * rows + 1.0) * (BLOCK[1] / _DOWN)
     y, x = np.meshgrid(down, np.arange(columns + 1.0) * BLOCK[0], indexing="ij")
     records, offsets = _fly_corners(field, view, x.ravel(), y.ravel(), s[1:], accuracy, max_steps)
-    corners = _corners(columns, rows)
-    height = np.asarray(offsets[2]).reshape(_STATIONS, -1) + view.eye[2]
-    gone = np.asarray(records.outside, dtype=bool).reshape(_STATIONS, -1) | (height < floor - _DEEP)
-    outside = gone[:, corners].all(axis=2)
-    lost = np.any(np.asarray(records.lost, dtype=bool).reshape(_STATIONS, -1)[-1][corners], axis=1)
-    # One behind the first station from which all four corners fly straight, or are lost to light: rays
-    # between them may be bent a little longer.
+    lattice = (_STATIONS, _DOWN * rows + 1, columns + 1)
+    height = np.asarray(offsets[2]).reshape(lattice) + view.eye[2]
+    gone = np.asarray(records.outside, dtype=bool).reshape(lattice) | (height < floor - _DEEP)
+    outside = ~_any_in_blocks(~gone, rows)
+    lost = _any_in_blocks(np.asarray(records.lost, dtype=bool).reshape(lattice)[-1:], rows)[0]
+    # One behind the first station from which all scouts fly straight, or are lost to light: rays between
+    # them may be bent a little longer.
     exits = np.where(outside.any(axis=0), outside.argmax(axis=0) + 1, _STATIONS - 1)
     exits = np.minimum(exits, _STATIONS - 1)
     last = s[1:][exits]
-    contacts = _contacts(field, view, boxes, records, offsets, corners, s, accuracy)
+    contacts = _contacts(field, view, boxes, records, offsets, columns, rows, s, accuracy)
     start, end, count = _join(contacts, last)
     looks = np.any((contacts.end > last) & (contacts.end >= contacts.begin), axis=0)
     return Segments(columns, rows, start, end, count, last, lost, looks, x.size)
@@ -182,20 +182,41 @@ def _fly_corners(
             stride=dr.opaque(UInt32, count),
         ),
         size=count * len(lengths),
+        ways_only=True,
     )
-    dr.eval(records.position, records.direction)
+    dr.eval(records.position)
     way = dr.tile(direction, len(lengths))
     offset = view.to_frame(way, types.Array3f(*records.position) - eye)
     dr.eval(offset)
     return records, [offset.x, offset.y, offset.z]
 
 
-def _corners(columns: int, rows: int) -> NDArray[np.int64]:
-    """Numbers (B, 2 * _DOWN + 2) of the lattice points on the left and right of each block, its four corners
-    first, from above."""
-    first = (_DOWN * np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
-    order = [0, _DOWN, *range(1, _DOWN)]
-    return np.stack([first + row * (columns + 1) + side for row in order for side in (0, 1)], axis=1)
+def _any_in_blocks(scouts: NDArray[np.bool_], rows: int) -> NDArray[np.bool_]:
+    """Whether it holds for any scout of each block: of (K, rows of scouts, columns + 1), (K, blocks)."""
+    strips = [scouts[:, number::_DOWN][:, :rows] for number in range(_DOWN + 1)]
+    sides = np.logical_or.reduce(strips)
+    return np.asarray(sides[..., :-1] | sides[..., 1:]).reshape(len(scouts), -1)
+
+
+def _strips(types: Any, offsets: list[Any], stray: Any, columns: int, rows: int) -> tuple[list[Any], Any]:
+    """Extremes of the scouts down each side of a row of blocks, at every station.
+
+    Returns the least and greatest offset along each axis (3 × 2 × Float), and the greatest stray. The strip
+    on the left of the blocks in column c of row r at station k stands at ((k · rows) + r)(columns + 1) + c.
+    """
+    UInt32, Float = types.UInt32, types.Float
+    lane = dr.arange(UInt32, _STATIONS * rows * (columns + 1))
+    side, row = lane % (columns + 1), lane // (columns + 1)
+    station, row = row // rows, row % rows
+    first = (station * (_DOWN * rows + 1) + row * _DOWN) * (columns + 1) + side
+    index = [first + number * (columns + 1) for number in range(_DOWN + 1)]
+    extremes = []
+    for offset in offsets:
+        places = [dr.gather(Float, offset, i) for i in index]
+        extremes.append((_reduce(dr.minimum, places), _reduce(dr.maximum, places)))
+    strays = _reduce(dr.maximum, [dr.gather(Float, stray, i) for i in index])
+    dr.eval(extremes, strays)
+    return extremes, strays
 
 
 def _contacts(
@@ -204,7 +225,8 @@ def _contacts(
     boxes: FloatArray,
     records: Any,
     offsets: list[Any],
-    corners: NDArray[np.int64],
+    columns: int,
+    rows: int,
     s: FloatArray,
     accuracy: float,
 ) -> _Contacts:
@@ -214,30 +236,39 @@ def _contacts(
     """
     types = field.types
     Float, UInt32 = types.Float, types.UInt32
-    blocks, rays, intervals = len(corners), offsets[0].shape[0] // (len(s) - 1), len(s) - 1
+    blocks, intervals = columns * rows, len(s) - 1
+    rays = (_DOWN * rows + 1) * (columns + 1)
     lane = dr.arange(UInt32, blocks * intervals)
     interval, block = lane // blocks, lane % blocks
-    about = [dr.gather(UInt32, UInt32(np.ascontiguousarray(corner)), block) for corner in corners.T]
+    row, column = block // columns, block % columns
     lengths = Float(s)
     s0, s1 = dr.gather(Float, lengths, interval), dr.gather(Float, lengths, interval + 1)
-    index = [interval * rays + corner for corner in about]
-    strays = [dr.gather(Float, records.stray, i) for i in index]
-    stray = _reduce(dr.maximum, strays)
+    began = interval > 0  # at the eye all rays are in one point
+    extremes, strays = _strips(types, offsets, records.stray, columns, rows)
+    left = (interval * rows + row) * (columns + 1) + column
+    stray = dr.maximum(dr.gather(Float, strays, left), dr.gather(Float, strays, left + 1))
     whole: list[Any] = []
-    own: list[list[Any]] = [[] for _ in range(4)]
-    for offset in offsets:
-        far = [dr.gather(Float, offset, i) for i in index]
-        # At the eye all rays are in one point.
-        near = [dr.gather(Float, offset, i - rays, interval > 0) for i in index]
+    for least, greatest in extremes:
         ends = []
-        for corner, length in ((near, s0), (far, s1)):
-            low, high = _reduce(dr.minimum, corner), _reduce(dr.maximum, corner)
+        for strip, length, there in ((left - rows * (columns + 1), s0, began), (left, s1, True)):
+            low, high = (
+                fold(dr.gather(Float, side, strip, there), dr.gather(Float, side, strip + 1, there))
+                for fold, side in ((dr.minimum, least), (dr.maximum, greatest))
+            )
             margin = dr.fma(high - low, _BETWEEN, dr.fma(length, accuracy, stray)) + _LEAST_MARGIN
             ends += [low - margin, high + margin]
         whole.append((ends[0], ends[2], ends[1], ends[3]))
-        for number, (begin, end) in enumerate(zip(near[:4], far[:4], strict=True)):
-            margin = dr.fma(s1, accuracy, strays[number]) + _LEAST_MARGIN
-            own[number].append((begin - margin, end - margin, begin + margin, end + margin))
+    own: list[list[Any]] = []
+    upper = interval * rays + row * (_DOWN * (columns + 1)) + column
+    lower = upper + _DOWN * (columns + 1)
+    for corner in (upper, upper + 1, lower, lower + 1):
+        margin = dr.fma(s1, accuracy, dr.gather(Float, records.stray, corner)) + _LEAST_MARGIN
+        faces = []
+        for offset in offsets:
+            begin = dr.gather(Float, offset, corner - rays, began)
+            end = dr.gather(Float, offset, corner)
+            faces.append((begin - margin, end - margin, begin + margin, end + margin))
+        own.append(faces)
     if not len(boxes):
         empty = np.full((intervals, blocks), np.inf)
         return _Contacts(
@@ -246,7 +277,7 @@ def _contacts(
     first, final, box, touches = _sweep(types, whole, own, view.boxes(boxes))
     begin, end = dr.fma(s1 - s0, first, s0), dr.fma(s1 - s0, final, s0)
     contacts = [dr.select(t <= 1, dr.fma(s1 - s0, t, s0), dr.inf) for t in touches]
-    dr.eval(begin, end, box, contacts)
+    dr.eval(first, begin, end, box, contacts)
     shape = (intervals, blocks)
     none = np.asarray(first).reshape(shape) > 1
     return _Contacts(

@@ -24,6 +24,7 @@ _NEAR: Final = 0.2  # the same within a segment
 _MOST_LEVERAGE: Final = 50.0
 _SHORT: Final = 0.3  # of the way to its end, that a segment may take up and count as short
 _FEW: Final = 0.05  # of all segments, that may be longer
+_SEAM: Final = 0.01  # of the way, by which the last piece is looked along before it begins
 
 
 @final
@@ -153,10 +154,10 @@ class SharedPaths:
             end = _test_beyond(end, far_surface or surface, looks & (end.status == ESCAPED))
         if not self.everywhere:
             single = active & ~shared
-            end = end.replaced(self._march_single(field, eye, d, place, single, options), single)
+            end = _march_singles(self, field, eye, d, place, end, single, options)
         return replace(end, status=dr.select(active, end.status, UInt32(NOT_TRACED)))
 
-    def _march_single(
+    def march_single(
         self, field: Field, eye: Any, direction: Any, place: _Place, active: Any, options: dict[str, Any]
     ) -> RayEnd:
         """March rays that share nothing: at first without a look at objects, up to where the first can be."""
@@ -252,14 +253,17 @@ class SharedPaths:
         length = dr.gather(Float, self._last, place.block, active)
         # Behind the segments of all blocks, also of those that have fewer.
         position, ahead = self.state(place, self._most, length, eye, direction, active)
+        # The segments' rays have been marched, this one is interpolated: what one meets a little behind its
+        # end the other may meet before its beginning. Rays have left the air one station earlier.
+        back = length * _SEAM
         return RayEnd(
             status=UInt32(ESCAPED),
             position=position,
             direction=ahead,
-            chord_origin=position,
+            chord_origin=dr.fma(ahead, -back, position),
             chord_direction=ahead,
             chord_length=Float(dr.inf),
-            chord_start=length,
+            chord_start=length - back,
             steps=UInt32(0),
             path_length=length,
             error=Float(0),
@@ -293,6 +297,19 @@ def _follow_segments(
         end = _add(end, piece, searching, met)
         number += 1
         searching = searching & ~met & (number < count)
+    return end
+
+
+@dr.syntax
+def _march_singles(
+    paths: SharedPaths, field: Field, eye: Any, d: Any, place: _Place, end: RayEnd, single: Any,
+    options: dict[str, Any],
+) -> RayEnd:  # fmt: skip
+    """The ends of rays that share nothing put in. A loop of one round: where there are none it is skipped."""
+    waiting = single
+    while dr.hint(waiting, label="march single rays", exclude=[paths, field, options]):
+        end = end.replaced(paths.march_single(field, eye, d, place, waiting, options), waiting)
+        waiting = waiting & False
     return end
 
 
@@ -330,13 +347,13 @@ def _add(end: RayEnd, piece: RayEnd, active: Any, ends: Any) -> RayEnd:
 
 def _test_beyond(end: RayEnd, surface: Surface, active: Any) -> RayEnd:
     """The same rays after a look along their last piece."""
-    hit, distance, *marks = surface(end.position, end.direction, end.chord_length, active)
+    hit, distance, *marks = surface(end.chord_origin, end.chord_direction, end.chord_length, active)
     hit = hit & active
     return replace(
         end,
         status=dr.select(hit, type(end.status)(HIT), end.status),
-        position=dr.select(hit, dr.fma(end.direction, distance, end.position), end.position),
-        path_length=dr.select(hit, end.path_length + distance, end.path_length),
+        position=dr.select(hit, dr.fma(end.chord_direction, distance, end.chord_origin), end.position),
+        path_length=dr.select(hit, end.chord_start + distance, end.path_length),
         queries=end.queries + dr.select(active, type(end.queries)(1), 0),
         mark=dr.select(hit, marks[0], end.mark) if marks else None,
     )

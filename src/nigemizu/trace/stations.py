@@ -55,7 +55,15 @@ class _Records:
 
 
 def fly(
-    field: Field, origin: Any, direction: Any, *, accuracy: Any, max_steps: Any, stations: Stations, size: int
+    field: Field,
+    origin: Any,
+    direction: Any,
+    *,
+    accuracy: Any,
+    max_steps: Any,
+    stations: Stations,
+    size: int,
+    ways_only: bool = False,
 ) -> _Records:
     """Fly rays through the field and write down their state at each station.
 
@@ -69,6 +77,8 @@ def fly(
     stations : Stations
     size : int
         Number of states that are written, by all rays together.
+    ways_only : bool
+        Leave out directions, steps and least heights.
 
     Notes
     -----
@@ -80,14 +90,15 @@ def fly(
     start = dr.select(enters, entry, 0)
     flight = Flight.begin(field, dr.fma(direction, start, origin), direction, start, enters, FIRST_TRIAL)
     Float, UInt32 = types.Float, types.UInt32
+    rest = 0 if ways_only else size
     records = _Records(
         position=[dr.opaque(Float, 0, shape=size) for _ in range(3)],
-        direction=[dr.opaque(Float, 0, shape=size) for _ in range(3)],
+        direction=[dr.opaque(Float, 0, shape=rest) for _ in range(3)],
         stray=dr.opaque(Float, 0, shape=size),
         outside=dr.opaque(UInt32, 0, shape=size),
         lost=dr.opaque(UInt32, 0, shape=size),
-        steps=dr.opaque(UInt32, 0, shape=size),
-        lowest=dr.opaque(Float, 0, shape=size),
+        steps=dr.opaque(UInt32, 0, shape=rest),
+        lowest=dr.opaque(Float, 0, shape=rest),
     )
     _fly(field, accuracy, UInt32(max_steps), flight, stations, records)
     return records
@@ -128,11 +139,14 @@ def _write(records: _Records, index: Any, flight: Flight, limit: Any, max_steps:
     position = dr.fma(ahead, dr.select(straight, limit - flight.path, 0), flight.position)
     for axis in range(3):
         dr.scatter(records.position[axis], position[axis], index)
-        dr.scatter(records.direction[axis], ahead[axis], index)
     dr.scatter(records.stray, flight.chord_length * flight.chord_turn * 0.25, index)
     one = type(index)(1)
     dr.scatter(records.outside, dr.select(flight.inside, 0, one), index)
     lost = flight.inside & (flight.steps >= max_steps)
     dr.scatter(records.lost, dr.select(lost, one, 0), index)
+    if not len(records.steps):
+        return
+    for axis in range(3):
+        dr.scatter(records.direction[axis], ahead[axis], index)
     dr.scatter(records.steps, flight.steps, index)
     dr.scatter(records.lowest, flight.turning, index)
