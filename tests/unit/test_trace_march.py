@@ -303,3 +303,19 @@ def test_tracer_describes_every_field_and_refuses_nonsense() -> None:
     ):
         with pytest.raises(ValidationError):
             trace.Tracer.model_validate(bad)
+
+
+def test_long_steps_share_no_chord_that_is_not_asked_for() -> None:
+    """Controlled steps are long; tested as they are, their chords would leave out the sag below them.
+
+    The ground lies 0.1 mm above the ray's turning point, and below the chord of the step around it. Negative
+    control: steps tested one by one miss it.
+    """
+    air = field.ExponentialSquare(DOUBLE, a=1.00027**2, amplitude=5e-5, height=0.05)
+    eye, ahead = DOUBLE.Array3f(0, 0, 1.5), DOUBLE.Array3f(1, 0, -0.002)
+    options = {"accuracy": 1e-7, "max_steps": 1000}
+    turn = trace.march(air, eye, ahead, details=True, **options)
+    low = float(turn.turning_height[0])
+    ground = trace.ground_plane(low + 1e-4)
+    assert status(trace.march(air, eye, ahead, surface=ground, **options)) == [trace.HIT]
+    assert status(trace.march(air, eye, ahead, surface=ground, chord_tolerance=0, **options)) != [trace.HIT]

@@ -174,7 +174,7 @@ class Bending:
         return {
             "accuracy": self._accuracy,
             "max_steps": self._max_steps,
-            "chord_tolerance": self._chord_tolerance if self.tracer.chord_tolerance > 0 else None,
+            "chord_tolerance": self._chord_tolerance if self.tracer.chord_tolerance > 0 else 0,
         }
 
     def _last(self, ray: Any, end: trace.RayEnd) -> tuple[Any, Any, Any, Any]:

@@ -238,7 +238,7 @@ def _follow(
         pixel = scene.camera.pixel_angle
         march |= {
             "accuracy": tracer.angle(pixel) * _FINER,
-            "chord_tolerance": tracer.chord_tolerance * pixel * _FINER or None,
+            "chord_tolerance": tracer.chord_tolerance * pixel * _FINER,
         }
     else:
         march |= {"step": tracer.step, "stepper": trace.stepper_named(tracer.stepper)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 import drjit as dr
 
@@ -17,6 +17,8 @@ from nigemizu.trace.stepping import FixedSteps, Flight, StepRule
 from nigemizu.trace.surfaces import Surface
 
 __all__ = ["march", "run"]
+
+_CHORDS: Final = 0.1  # of the accuracy, that chords may use up where nothing is said
 
 
 def march(
@@ -59,7 +61,8 @@ def march(
         ``surface(origin, direction, length, active) -> (hit, distance)``.
     chord_tolerance : float or Float, optional, rad
         How far a tested chord may lie from the bent ray, as an angle seen from the ray's origin (a
-        fraction of a pixel). None tests after every step.
+        fraction of a pixel). The number 0 tests after every step, however long. By default a tenth of the
+        accuracy; fixed steps are tested one by one.
     max_chord_steps : int
         Most steps that share a chord.
     travelled : Float, m
@@ -140,7 +143,7 @@ def march(
     options = {
         "max_steps": UInt32(max_steps),
         "limit": None if max_distance is None else limit,
-        "chord_tolerance": None if chord_tolerance is None or surface is None else Float(chord_tolerance),
+        "chord_tolerance": None if surface is None else _chord_tolerance(Float, chord_tolerance, accuracy),
         "max_chord_steps": max_chord_steps,
         "details": details,
     }
@@ -191,6 +194,13 @@ def march(
         mark=chord.mark,
         trial=flight.trial,
     )
+
+
+def _chord_tolerance(Float: Any, given: Any, accuracy: Any) -> Any:
+    """The tolerance on the device; None where every step is tested."""
+    if given is None:
+        return None if accuracy is None else Float(accuracy) * _CHORDS
+    return None if isinstance(given, int | float) and given == 0 else Float(given)
 
 
 @dr.syntax

@@ -58,11 +58,12 @@ class Tracer(Value):
         "within the accuracy",
     )
     chord_tolerance: float = Described(
-        0.05,
+        0.01,
         ge=0,
         le=1,
         description="how far a straight piece that is tested against objects may lie from the bent ray, "
-        "fraction of a pixel; 0 tests after every interval",
+        "fraction of a pixel; 0 tests after every interval. Rays that graze a hot ground lie closer to each "
+        "other than pixels elsewhere: at 0.05 the vanishing line is a pixel low",
     )
     beyond: Literal["straight", "extend"] = Described(
         "straight",

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 DISTANCE: Final = 40_000.0  # m
 ACCURACY: Final = 0.1  # pixel
-CHORD: Final = 0.05  # pixel, by which a tested chord may lie from the ray
+CHORD: Final = 0.01  # pixel, by which a tested chord may lie from the ray
 EARTH_RADIUS: Final = 6_371_000.0  # m
 EYE: Final = 10.0  # m
 PIXEL: Final = 1.5e-5  # rad; 960 of them are 0.8°, the view of a 2500 mm lens
