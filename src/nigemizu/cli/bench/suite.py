@@ -81,7 +81,7 @@ class Sizes:
 
     picture: tuple[int, int] = (960, 540)
     samples: int = 16
-    road_picture: tuple[int, int] = (640, 360)
+    road_picture: tuple[int, int] = (480, 270)
     road_samples: int = 4
     road: Nodes = (512, 128, 64)
     march: Voxels = FLAT
@@ -93,7 +93,7 @@ class Sizes:
     heat: Nodes = (256, 128, 96)
     film: tuple[int, int] = (480, 270)
     frames: int = 3
-    growth: tuple[int, int] = (640, 360)
+    growth: tuple[int, int] = (480, 270)
     growth_samples: int = 4
     growth_road_picture: tuple[int, int] = (320, 180)
     growth_road: Nodes = (256, 64, 32)
