@@ -15,7 +15,7 @@ from nigemizu.trace.view import View, spread
 
 __all__ = ["grounded", "share_paths"]
 
-_SHARING: Final = 0.8  # of the accuracy that sharing may use up
+_SHARING: Final = 0.7  # of the accuracy that sharing may use up
 _FAR: Final = 0.5  # of the median exit: blocks that are left sooner are not tested either
 _QUIET: Final = 0.02  # of the accuracy: blocks whose error is estimated smaller are not tested
 _TESTS: Final = (4, 512, 8192)  # rays in each of the others: at least, at most, and in all of them together
