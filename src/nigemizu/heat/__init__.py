@@ -19,6 +19,9 @@ if TYPE_CHECKING:
         Top,
     )
     from nigemizu.heat.dataset import complete, mean_temperature_at, read_air, refractivity_at, to_dataset
+    from nigemizu.heat.flow.checkpoint import Checkpoints
+    from nigemizu.heat.flow.running import convect
+    from nigemizu.heat.flow.settings import Convection
     from nigemizu.heat.grid import Grid, GridSpec, require_memory
     from nigemizu.heat.initial import Initial, ProfileTable, Unevenness
     from nigemizu.heat.quantity import (
@@ -36,6 +39,8 @@ if TYPE_CHECKING:
     from nigemizu.heat.transport import Diffusivity, Wind
 
 __all__ = [
+    "Checkpoints",
+    "Convection",
     "Daily",
     "Diffusivity",
     "Disc",
@@ -60,6 +65,7 @@ __all__ = [
     "Unevenness",
     "Wind",
     "complete",
+    "convect",
     "evolve",
     "mean_temperature_at",
     "read_air",
@@ -72,6 +78,9 @@ __all__ = [
 _HOMES: Final = {
     "boundary": ("ExchangeGround", "FluxGround", "GroundBoundary", "HeldGround", "Sides", "Top"),
     "dataset": ("complete", "mean_temperature_at", "read_air", "refractivity_at", "to_dataset"),
+    "flow.checkpoint": ("Checkpoints",),
+    "flow.running": ("convect",),
+    "flow.settings": ("Convection",),
     "solver": ("State", "evolve", "solve"),
     "grid": ("Grid", "GridSpec", "require_memory"),
     "initial": ("Initial", "ProfileTable", "Unevenness"),

@@ -36,6 +36,7 @@ _AXES: Final[dict[str, dict[str, str]]] = {
     "y": {"standard_name": "projection_y_coordinate", "long_name": "left", "units": "m", "axis": "Y"},
     "x": {"standard_name": "projection_x_coordinate", "long_name": "forward", "units": "m", "axis": "X"},
 }
+_WIND: Final = {"x_wind": "forward", "y_wind": "to the left", "upward_air_velocity": "upwards"}
 _VARIABLES: Final[dict[str, dict[str, str]]] = {
     "air_temperature": {
         "standard_name": "air_temperature",
@@ -48,6 +49,10 @@ _VARIABLES: Final[dict[str, dict[str, str]]] = {
         "long_name": "temperature of the skin of the ground",
         "units": "K",
         "units_metadata": "temperature: on_scale",
+    },
+    **{
+        name: {"standard_name": name, "long_name": f"wind {way}", "units": "m s-1"}
+        for name, way in _WIND.items()
     },
     "air_pressure": {"standard_name": "air_pressure", "long_name": "hydrostatic air pressure", "units": "Pa"},
     "air_refractivity": {
@@ -85,7 +90,7 @@ def to_dataset(
         Its nz, ny, nx cells hold the temperatures.
     states : iterable of State
         Each with ``time`` (s), ``temperature`` (nz, ny, nx) float64 (K) and ``surface_temperature``
-        (ny, nx) float64 (K), or None.
+        (ny, nx) float64 (K), or None; where the air moves by itself also ``wind`` (m/s), three volumes.
     title : str
         What the air is, in a few words.
     scene : str
@@ -96,8 +101,8 @@ def to_dataset(
     Returns
     -------
     xarray.Dataset
-        ``air_temperature`` on (time, z, y, x), ``surface_temperature`` on (time, y, x), K, and the faces of
-        the cells. With a single state the temperature is not copied.
+        ``air_temperature`` on (time, z, y, x), ``surface_temperature`` on (time, y, x), K, the wind (m/s) if
+        it is known, and the faces of the cells. With a single state the temperature is not copied.
 
     Raises
     ------
@@ -146,6 +151,10 @@ def to_dataset(
             _stacked(known),
             _VARIABLES["surface_temperature"],
         )
+    winds = [getattr(state, "wind", None) for state in instants]
+    if all(wind is not None for wind in winds):
+        for name, part in zip(_WIND, zip(*winds, strict=True), strict=True):
+            variables[name] = (("time", "z", "y", "x"), _stacked(list(part)), _VARIABLES[name])
     for name, edge in edges.items():
         variables[f"{name}_bounds"] = ((name, "bounds"), np.stack([edge[:-1], edge[1:]], axis=1))
     return xr.Dataset(variables, coordinates, _provenance(title, scene, history))

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-__all__ = ["move_levels", "spread_columns", "spread_groups"]
+__all__ = ["compiled", "move_levels", "spread_columns", "spread_groups"]
 
 
-def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Compile without the interpreter's lock, and keep the machine code for the next process."""
 
     def decorate(function: Callable[..., Any]) -> Any:
@@ -34,7 +34,7 @@ def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 PAD = 3  # cells of padding on each side: the donor before the first cell, and two more
 
 
-@_compiled()
+@compiled()
 def _beyond(index, count, periodic, reflecting):  # type: ignore[no-untyped-def]
     """The cell that stands for `index` outside 0..count-1: wrapped, mirrored, or the outermost one."""
     if periodic:
@@ -45,7 +45,7 @@ def _beyond(index, count, periodic, reflecting):  # type: ignore[no-untyped-def]
     return min(max(index, 0), count - 1)
 
 
-@_compiled()
+@compiled()
 def _fill(source, padded, pad, shift, periodic, reflecting):  # type: ignore[no-untyped-def]
     """Copy a row, moved by `shift` cells, with `pad` cells of what lies beyond on each side."""
     count = source.size
@@ -59,7 +59,7 @@ def _fill(source, padded, pad, shift, periodic, reflecting):  # type: ignore[no-
         padded[m] = source[_beyond(m - pad - shift, count, periodic, reflecting)]
 
 
-@_compiled()
+@compiled()
 def _face_flux(a, b, C, d, e, w, c, flux):  # type: ignore[no-untyped-def]
     """What leaves the donor cells `C` through their downwind face; `a`, `b` lie upwind, `d`, `e` downwind.
 
@@ -78,7 +78,7 @@ def _face_flux(a, b, C, d, e, w, c, flux):  # type: ignore[no-untyped-def]
         flux[i] = c * (centre + min(highest, max(lowest, high)))
 
 
-@_compiled()
+@compiled()
 def _carry_x(source, target, shift, c, w, periodic, row, flux):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(ny):
@@ -96,7 +96,7 @@ def _carry_x(source, target, shift, c, w, periodic, row, flux):  # type: ignore[
                 out[i] = row[i + PAD] - (flux[i + 1] - flux[i])
 
 
-@_compiled()
+@compiled()
 def _carry_y(source, target, shift, c, w, periodic, before, after):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(-1, ny):
@@ -123,7 +123,7 @@ def _carry_y(source, target, shift, c, w, periodic, before, after):  # type: ign
         before, after = after, before
 
 
-@_compiled()
+@compiled()
 def _spread_x(source, target, half, weights, periodic, row):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(ny):
@@ -137,7 +137,7 @@ def _spread_x(source, target, half, weights, periodic, row):  # type: ignore[no-
                 out[i] += weight * (left[i] + right[i])
 
 
-@_compiled()
+@compiled()
 def _spread_y(source, target, half, weights, periodic):  # type: ignore[no-untyped-def]
     ny, nx = source.shape
     for j in range(ny):
@@ -152,7 +152,7 @@ def _spread_y(source, target, half, weights, periodic):  # type: ignore[no-untyp
                 out[i] += weight * (left[i] + right[i])
 
 
-@_compiled()
+@compiled()
 def move_levels(  # type: ignore[no-untyped-def]
     air, first, stride, y_first, shifts, parts, carry_weights, halves, spread_weights, periodic
 ):
@@ -242,7 +242,7 @@ def _multiply_row(row, begin, end, levels, block, line, count):  # type: ignore[
             k += 1
 
 
-@_compiled(fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def spread_columns(matrix, begins, ends, air, result, first, last):  # type: ignore[no-untyped-def]
     """Multiply the columns ``first … last - 1`` of `air` by `matrix`.
 
@@ -273,7 +273,7 @@ def spread_columns(matrix, begins, ends, air, result, first, last):  # type: ign
                 result[i, corner + m] = line[m]
 
 
-@_compiled(fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def spread_groups(  # type: ignore[no-untyped-def]
     matrices, begins, ends, firsts, columns, weights, air, result, first, last
 ):

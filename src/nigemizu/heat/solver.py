@@ -20,7 +20,7 @@ from nigemizu.progress import SILENT, ProgressMeter
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["State", "choose_time_step", "evolve", "solve"]
+__all__ = ["State", "check_temperature", "check_times", "choose_time_step", "evolve", "solve"]
 
 COURANT: Final = 2.0
 """Cells that the wind crosses in an automatic step: bounds the error of splitting, not stability."""
@@ -113,11 +113,11 @@ def evolve(
     """
     top, sides = top or Top(), sides or Sides()
     diffusivity, wind = diffusivity or Diffusivity(), wind or Wind()
-    instants = _check_times(times, start)
+    instants = check_times(times, start)
     if time_step is not None and not (time_step > 0 and math.isfinite(time_step)):
         raise InputError("the time step must be above zero", key="time.step", value=time_step)
     require_memory(math.prod(grid.shape), available=available)
-    initial = _check_temperature(grid, temperature)
+    initial = check_temperature(grid, temperature)
     longest = time_step or choose_time_step(grid, ground, diffusivity, wind)
     stepper = Stepper(grid, initial, ground, top, diffusivity, wind, sides)
     return _march(stepper, instants, start, longest, progress)
@@ -214,7 +214,8 @@ def _steps(interval: float, longest: float) -> int:
     return 0 if interval == 0 else max(1, math.ceil(interval / longest * (1 - 1e-12)))
 
 
-def _check_times(times: Sequence[float], start: float) -> list[float]:
+def check_times(times: Sequence[float], start: float) -> list[float]:
+    """The wanted instants [s], refused unless they increase from `start` on."""
     instants = [float(time) for time in times]
     if not instants:
         raise InputError("no times are wanted", key="times")
@@ -225,7 +226,8 @@ def _check_times(times: Sequence[float], start: float) -> list[float]:
     return instants
 
 
-def _check_temperature(grid: Grid, temperature: np.ndarray) -> np.ndarray:
+def check_temperature(grid: Grid, temperature: np.ndarray) -> np.ndarray:
+    """The temperature [K] as float64, refused unless it fits the grid and is above zero everywhere."""
     initial = np.asarray(temperature, dtype=np.float64)
     if initial.shape != grid.shape:
         raise InputError(

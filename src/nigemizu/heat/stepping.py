@@ -36,11 +36,14 @@ class State:
         At the cell centres.
     surface_temperature : (ny, nx) float64, K
         Of the air's skin on the ground, at the lower face of the lowest cells.
+    wind : tuple of (nz, ny, nx) float64, m s-1, optional
+        Along x, y and upwards at the cell centres, where the air moves by itself.
     """
 
     time: float
     temperature: np.ndarray
     surface_temperature: np.ndarray
+    wind: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
 
 class GroundCourse:

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nigemizu.errors import InputError, NigemizuWarning
+from nigemizu.heat.flow.settings import VOLUMES
+from nigemizu.heat.grid import VOLUMES_IN_MEMORY
 from nigemizu.values import Value
 
 if TYPE_CHECKING:
@@ -25,6 +27,23 @@ def check(scene: Scene, available: Callable[[], int | None]) -> None:
     _check_camera(scene)
     _check_memory(scene, available)
     _check_extent(scene)
+    if scene.process == "convection":
+        _check_flow(scene)
+
+
+def _check_flow(scene: Scene) -> None:
+    from nigemizu.heat.flow.checks import require_resolved
+
+    grid = scene.grid.build()
+    require_resolved(
+        grid,
+        scene.convection,
+        scene.ground,
+        scene.wind,
+        scene.initial.sample(grid).mean(axis=(1, 2)),
+        scene.diffusivity.molecular,
+        max(scene.time.duration, max(scene.film.times)),
+    )
 
 
 def _check_files(scene: Scene) -> None:
@@ -68,6 +87,8 @@ def _check_camera(scene: Scene) -> None:
 
 def _check_memory(scene: Scene, available: Callable[[], int | None]) -> None:
     needed, at_hand = scene.grid.memory(), available()
+    if scene.process == "convection":
+        needed = needed * VOLUMES // VOLUMES_IN_MEMORY
     if at_hand is not None and needed > at_hand:
         raise InputError(
             f"the volume needs {needed / 1e9:.1f} GB of memory and {at_hand / 1e9:.1f} GB are available",

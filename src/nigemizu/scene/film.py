@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import multiprocessing
 import os
+import shutil
 import signal
 import warnings
 from collections import Counter
@@ -72,6 +73,7 @@ def animate(
     else:
         outcomes = _render_in_processes(scene, jobs, variant, workers, progress)
     progress.finish()
+    shutil.rmtree(_air_folder(folder.path), ignore_errors=True)
     statuses, report = _joined(outcomes)
     warn_of_lost_rays(statuses, scene)
     if report is not None:
@@ -84,6 +86,11 @@ def animate(
 def frames_folder(path: Path) -> Path:
     """Where the numbered frames of the film `path` lie."""
     return path.with_name(f"{path.stem}_frames")
+
+
+def _air_folder(frames: Path) -> Path:
+    """Where air that moves by itself is kept while the film is not complete."""
+    return frames.with_name(f"{frames.name}_air")
 
 
 def _require_instants(scene: Scene, air: AirSource) -> None:
@@ -99,8 +106,8 @@ def _require_instants(scene: Scene, air: AirSource) -> None:
 def _jobs(scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSource) -> Iterator[_Job]:
     """The frames that are missing, with their air.
 
-    The heat stage runs from the beginning even when only the last frame is missing: a frame is the same
-    whether the film was interrupted before it or not.
+    The heat stage runs from the beginning even when only the last frame is missing, or from a checkpoint of
+    air that moves by itself: a frame is the same whether the film was interrupted before it or not.
     """
     if not missing:
         return
@@ -109,7 +116,9 @@ def _jobs(scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSou
         return
     wanted = frozenset(missing)
     times = scene.film.times[: missing[-1] + 1]
-    for index, volume in enumerate(air_instants(scene, times, air, SILENT)):
+    kept = _air_folder(folder.path)
+    instants = air_instants(scene, times, air, SILENT, first=missing[0], folder=kept)
+    for index, volume in enumerate(instants, start=missing[0]):
         if index in wanted:
             yield index, volume, folder.frame(index)
 

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
-from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, final
+from typing import TYPE_CHECKING, Any, Literal, Self, final
 
 from pydantic import model_validator
 
 from nigemizu.air import Atmosphere
 from nigemizu.errors import InputError
 from nigemizu.heat.boundary import GroundBoundary, Sides, Top
+from nigemizu.heat.flow.settings import Convection
 from nigemizu.heat.grid import GridSpec
 from nigemizu.heat.initial import Initial
 from nigemizu.heat.transport import Diffusivity, Wind
 from nigemizu.memory import available_memory
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.render import Camera, Light, Object
+from nigemizu.scene.builtins import builtin_names, builtin_text
 from nigemizu.scene.reading import apply_overrides, parse_toml, read_text, validate
 from nigemizu.scene.times import FilmSpec, TimeSpec
 from nigemizu.scene.writing import to_toml
@@ -58,6 +58,10 @@ class Scene(Value):
         Temperature at the beginning.
     ground, sides, top, diffusivity, wind : GroundBoundary, Sides, Top, Diffusivity, Wind
         Boundaries of the air, and how heat spreads and is carried.
+    process : {"diffusion", "convection"}
+        Whether heat spreads in air that the wind alone moves, or hot air rises, breaks up and mixes.
+    convection : Convection
+        How it does so.
     time, film, tracer : TimeSpec, FilmSpec, Tracer
         What is simulated, what a film shows, and how rays are followed.
     camera, light : Camera, Light
@@ -84,6 +88,8 @@ class Scene(Value):
     top: Top = Top()
     diffusivity: Diffusivity = Diffusivity()
     wind: Wind = Wind()
+    process: Literal["diffusion", "convection"] = "diffusion"
+    convection: Convection = Convection()
     time: TimeSpec = TimeSpec()
     film: FilmSpec = FilmSpec()
     tracer: Tracer = Tracer()
@@ -119,12 +125,11 @@ class Scene(Value):
             If there is no such scene or anything in it cannot be used.
         """
         name = os.fspath(name_or_path)
-        if name in _builtin_names():
-            text = _builtin_folder().joinpath(f"{name}.toml").read_text(encoding="utf-8")
-            return cls.from_toml(text, file=name, overrides=overrides)
+        if name in builtin_names():
+            return cls.from_toml(builtin_text(name), file=name, overrides=overrides)
         path = Path(name).expanduser()
         if not path.is_file():
-            raise InputError("no such scene or file", file=name, remedy=nearest(name, _builtin_names()))
+            raise InputError("no such scene or file", file=name, remedy=nearest(name, builtin_names()))
         return cls.from_toml(read_text(path), file=name, folder=path.resolve().parent, overrides=overrides)
 
     @classmethod
@@ -387,13 +392,4 @@ def load(name_or_path: str | os.PathLike[str], overrides: Mapping[str, Any] | No
 
 def builtin_scenes() -> dict[str, str]:
     """Names of the built-in scenes and their titles."""
-    return {name: Scene.load(name).title for name in _builtin_names()}
-
-
-def _builtin_folder() -> Traversable:
-    return resources.files("nigemizu.scene") / "builtin"
-
-
-def _builtin_names() -> tuple[str, ...]:
-    names = (entry.name for entry in _builtin_folder().iterdir())
-    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
+    return {name: Scene.load(name).title for name in builtin_names()}

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+import itertools
+import json
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +20,7 @@ from nigemizu.progress import ProgressMeter
 if TYPE_CHECKING:
     import xarray
 
-    from nigemizu.heat import State
+    from nigemizu.heat import Checkpoints, State
     from nigemizu.scene.model import Scene
 
 __all__ = [
@@ -35,6 +38,8 @@ __all__ = [
 AirSource: TypeAlias = "xarray.Dataset | AirVolume | str | os.PathLike[str] | None"
 Variant: TypeAlias = Literal["auto", "llvm", "cuda"]
 FloatArray: TypeAlias = NDArray[np.float64]
+
+_PHYSICS: Final = {"grid", "initial", "ground", "sides", "top", "diffusivity", "wind", "convection"}
 
 
 class AirVolume(NamedTuple):
@@ -77,9 +82,13 @@ def save_air(scene: Scene, path: Path, command: str, progress: ProgressMeter) ->
     scene.check()
     path = ready_to_write(path, (".zarr", ".nc"))
     grid, about = scene.grid.build(), {"title": scene.title, "scene": scene.to_toml(), "history": command}
-    states = _states(scene, scene.time.stored, progress)
+    kept = checkpoints(scene, scene.time.stored, path.with_name(f"{path.name}.checkpoints"))
+    states = _states(scene, scene.time.stored, progress) if kept is None else _kept(scene, kept, progress)
     instants = (complete(to_dataset(grid, [state], **about), scene.air) for state in states)
-    return write_air(air=instants, path=path)
+    written = write_air(air=instants, path=path)
+    if kept is not None:
+        kept.remove()
+    return written
 
 
 def air_at(scene: Scene, time: float | None, air: AirSource, progress: ProgressMeter) -> AirVolume:
@@ -91,23 +100,33 @@ def air_at(scene: Scene, time: float | None, air: AirSource, progress: ProgressM
 
 
 def air_instants(
-    scene: Scene, times: tuple[float, ...], air: AirSource, progress: ProgressMeter
+    scene: Scene,
+    times: tuple[float, ...],
+    air: AirSource,
+    progress: ProgressMeter,
+    *,
+    first: int = 0,
+    folder: Path | None = None,
 ) -> Iterator[AirVolume]:
-    """The air at each of the instants, one after another; only one is held."""
+    """The air at each of the instants from number `first` on, one after another; only one is held.
+
+    Air that moves by itself is kept in `folder` from time to time, and taken up from there.
+    """
     from nigemizu.heat import to_dataset
 
     if isinstance(air, AirVolume):  # air that does not change
-        yield from (air for _ in times)
+        yield from (air for _ in times[first:])
         return
     _require_times(times, scene)
     if air is not None:
         dataset = open_air(air)
         require_within(dataset, times)
-        for time in times:
+        for time in times[first:]:
             yield _volume(scene, dataset, time)
         return
     grid = scene.grid.build()
-    for state in _states(scene, times, progress):
+    kept = None if folder is None else checkpoints(scene, times, folder)
+    for state in _states(scene, times, progress, first, kept):
         yield _volume(scene, to_dataset(grid, [state]), state.time)
 
 
@@ -129,22 +148,55 @@ def open_air(air: xarray.Dataset | str | os.PathLike[str]) -> xarray.Dataset:
     return air
 
 
-def _states(scene: Scene, times: tuple[float, ...], progress: ProgressMeter) -> Iterable[State]:
-    from nigemizu.heat import evolve
+def checkpoints(scene: Scene, times: tuple[float, ...], folder: Path) -> Checkpoints | None:
+    """Where air that moves by itself is kept on its way through these instants; None for other air."""
+    if scene.process != "convection":
+        return None
+    from nigemizu.heat import Checkpoints
+
+    physics = scene.model_dump(include=_PHYSICS, mode="json") | {"times": times, "step": scene.time.step}
+    identity = hashlib.sha256(json.dumps(physics, sort_keys=True).encode()).hexdigest()
+    return Checkpoints(folder, identity, scene.convection.checkpoint_every or max(times) / 20)
+
+
+def _kept(scene: Scene, kept: Checkpoints, progress: ProgressMeter) -> Iterator[State]:
+    """All stored instants: those of an interrupted run first, then those of the flow that goes on."""
+    first, times = 0, scene.time.stored
+    for state in kept.instants():
+        yield state
+        first += 1
+    if first < len(times):
+        for number, state in enumerate(_states(scene, times, progress, first, kept), start=first):
+            kept.keep(number, state)
+            yield state
+
+
+def _states(
+    scene: Scene,
+    times: tuple[float, ...],
+    progress: ProgressMeter,
+    first: int = 0,
+    kept: Checkpoints | None = None,
+) -> Iterable[State]:
+    from nigemizu.heat import convect, evolve
 
     grid = scene.grid.build()
-    return evolve(
-        grid,
-        scene.initial.sample(grid),
-        ground=scene.ground,
-        sides=scene.sides,
-        top=scene.top,
-        diffusivity=scene.diffusivity,
-        wind=scene.wind,
-        times=times,
-        time_step=scene.time.step,
-        progress=progress,
-    )
+    temperature = scene.initial.sample(grid)
+    common: dict[str, Any] = {
+        "ground": scene.ground,
+        "sides": scene.sides,
+        "top": scene.top,
+        "diffusivity": scene.diffusivity,
+        "wind": scene.wind,
+        "times": times,
+        "time_step": scene.time.step,
+        "progress": progress,
+    }
+    if scene.process == "convection":
+        return convect(
+            grid, temperature, convection=scene.convection, checkpoints=kept, first=first, **common
+        )
+    return itertools.islice(evolve(grid, temperature, **common), first, None)
 
 
 def _require_times(times: tuple[float, ...], scene: Scene) -> None:
