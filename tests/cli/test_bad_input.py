@@ -191,7 +191,7 @@ def test_datasets_that_cannot_be_used(run: Run, small: tuple[str, ...]) -> None:
     holes[1, 0, 1] = np.nan
     bad = {
         "nan.nc": (_dataset(air_temperature=(("z", "y", "x"), holes)), ["air_temperature", "NaN"]),
-        "order.nc": (_dataset().isel(x=[1, 0]), ["x", "increase"]),
+        "order.nc": (_dataset().isel(x=[0, 0]), ["x", "increase"]),
         "units.nc": (
             _dataset(air_temperature=(("z", "y", "x"), np.full((3, 2, 2), 300.0), {"units": "m"})),
             ["air_temperature", "'m'"],
@@ -206,7 +206,7 @@ def test_datasets_that_cannot_be_used(run: Run, small: tuple[str, ...]) -> None:
     done = run("render", "pyramid", "-o", "out.png", "--air", "text.nc", *small)
     assert_refused(done, "text.nc", left={*bad, "text.nc"})
     done = run("render", "pyramid", "-o", "out.png", "--air", "gone.zarr", *small)
-    assert_refused(done, "gone.zarr", "no such dataset", left={*bad, "text.nc"})
+    assert_refused(done, "gone.zarr", "no such", left={*bad, "text.nc"})
 
 
 def test_time_outside_the_stored_air(run: Run, small: tuple[str, ...]) -> None:

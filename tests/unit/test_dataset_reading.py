@@ -116,7 +116,7 @@ def plain(values, units="K", **coordinates):
         (with_gap, ["air_temperature", "2 of 72", "time 1, z 2, y 0, x 3"]),
         (
             lambda: xr.Dataset({"air_temprature": ("z", [300.0] * 3), "u": ("z", [0.0] * 3)}, {"z": Z}),
-            ["no variable air_temperature", "air_temprature, u", "is it 'air_temprature'?"],
+            ["no variable air_temperature", "air_temprature(z), u(z)", "is it 'air_temprature'?"],
         ),
         (lambda: xr.Dataset(), ["no variable at all"]),
         (lambda: plain([300.0] * 3, z=[0.0, 2.0, 1.0]), ["z", "does not increase at index 2", "sort it"]),

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from nigemizu.air import Atmosphere
 from nigemizu.errors import InputError
-from nigemizu.heat.reading import read_air
+from nigemizu.heat.instants import Index, at_instant, bracket, has_temperature, instants, shaped
+from nigemizu.heat.reading import absolute, read_air
 
 if TYPE_CHECKING:
     from nigemizu.heat.grid import Grid
@@ -174,7 +175,7 @@ def complete(dataset: xr.Dataset, atmosphere: Atmosphere) -> xr.Dataset:
     -------
     xarray.Dataset
         With ``air_pressure`` (time, z), Pa, unless it was there, and ``air_refractivity``, n − 1, on all of
-        its axes; the given dataset is not changed.
+        its axes; a potential temperature has become one of temperature. The given dataset is not changed.
 
     Raises
     ------
@@ -187,13 +188,13 @@ def complete(dataset: xr.Dataset, atmosphere: Atmosphere) -> xr.Dataset:
     between neighbouring columns, below 1 Pa over a hot road, are left out; they change n − 1 by less than
     1e-5 of itself.
     """
-    if "air_temperature" not in dataset:
+    if not has_temperature(dataset):
         raise InputError("the dataset has no temperature to be completed", key="air_temperature")
     axes = [axis for axis in ("time", "z", "y", "x") if axis in dataset.dims]
     refractivity = np.empty([dataset.sizes[axis] for axis in axes])
     pressures = []
-    for index in _instants(dataset):
-        temperature, pressure, humidity = _state(_at(dataset, index), atmosphere)
+    for index in instants(dataset):
+        temperature, pressure, humidity = _state(at_instant(dataset, index, atmosphere), atmosphere)
         volume = atmosphere.refractivity(temperature, pressure, relative_humidity=humidity)
         refractivity[index] = volume.reshape(refractivity[index].shape)
         pressures.append(pressure[:, 0, 0])
@@ -215,7 +216,11 @@ def complete(dataset: xr.Dataset, atmosphere: Atmosphere) -> xr.Dataset:
             np.stack(pressures) if timed else pressures[0],
             _VARIABLES["air_pressure"],
         )
-    return dataset.assign(added)
+    completed = dataset.assign(added)
+    if "air_temperature" in completed:
+        return completed
+    warmth = absolute(completed["air_potential_temperature"], completed["air_pressure"])
+    return completed.drop_vars("air_potential_temperature").assign(air_temperature=warmth)
 
 
 def refractivity_at(
@@ -252,7 +257,7 @@ def refractivity_at(
     -----
     n(t) = (1 − w) n(t₀) + w n(t₁), w = (t − t₀)/(t₁ − t₀).
     """
-    lower, upper, weight = _bracket(dataset, time)
+    lower, upper, weight = bracket(dataset, time)
     z, values = _nodes(dataset, lower, atmosphere)
     if weight > 0.0:
         later = _nodes(dataset, upper, atmosphere)[1]
@@ -262,7 +267,9 @@ def refractivity_at(
     return x, y, z, np.ascontiguousarray(full)
 
 
-def mean_temperature_at(dataset: xr.Dataset, time: float) -> FloatArray | None:
+def mean_temperature_at(
+    dataset: xr.Dataset, time: float, atmosphere: Atmosphere | None = None
+) -> FloatArray | None:
     """Horizontal mean of the temperature at the heights of `refractivity_at`, linear in time.
 
     Parameters
@@ -271,6 +278,8 @@ def mean_temperature_at(dataset: xr.Dataset, time: float) -> FloatArray | None:
         As `to_dataset`, `complete` or `read_air` return it.
     time : float, s
         Any, when the dataset has no time axis.
+    atmosphere : Atmosphere, optional
+        Tells the pressure at height 0, for a potential temperature without a pressure; default: the standard.
 
     Returns
     -------
@@ -282,14 +291,12 @@ def mean_temperature_at(dataset: xr.Dataset, time: float) -> FloatArray | None:
     InputError
         The time is outside the range of the dataset.
     """
-    if "air_temperature" not in dataset:
+    if not has_temperature(dataset):
         return None
-    lower, upper, weight = _bracket(dataset, time)
-    before, after = (_mean_nodes(_at(dataset, index)) for index in (lower, upper))
+    air = atmosphere or Atmosphere()
+    lower, upper, weight = bracket(dataset, time)
+    before, after = (_mean_nodes(at_instant(dataset, index, air, optics=False)) for index in (lower, upper))
     return before + weight * (after - before)
-
-
-_Index: TypeAlias = tuple[int, ...]
 
 
 def _stacked(arrays: list[FloatArray]) -> FloatArray:
@@ -304,47 +311,28 @@ def _provenance(title: str, scene: str, history: str) -> dict[str, str]:
     return attributes
 
 
-def _instants(dataset: xr.Dataset) -> list[_Index]:
-    """Indices along time; the empty one for air that does not change."""
-    return [(index,) for index in range(dataset.sizes["time"])] if "time" in dataset.dims else [()]
-
-
-def _at(dataset: xr.Dataset, index: _Index) -> xr.Dataset:
-    instant = dataset.isel(time=index[0]) if index else dataset
-    order = [axis for axis in ("z", "y", "x") if axis in instant.dims]
-    return instant.transpose(*order, ...)
-
-
-def _shaped(variable: xr.DataArray) -> FloatArray:
-    """Values on (z, y, x), with length 1 along the axes that the variable lacks."""
-    axes = ("z", "y", "x")
-    missing = [axis for axis in axes if axis not in variable.dims]
-    full = variable.expand_dims(missing).transpose(*axes)
-    return np.asarray(full.values, dtype=np.float64)
-
-
 def _state(instant: xr.Dataset, atmosphere: Atmosphere) -> tuple[FloatArray, FloatArray, FloatArray | None]:
     """Temperature, pressure and humidity (if stored) of the instant, broadcastable to (nz, ny, nx)."""
-    temperature = _shaped(instant["air_temperature"])
-    humidity = _shaped(instant["relative_humidity"]) if "relative_humidity" in instant else None
+    temperature = shaped(instant["air_temperature"])
+    humidity = shaped(instant["relative_humidity"]) if "relative_humidity" in instant else None
     if "air_pressure" in instant:
-        return temperature, _shaped(instant["air_pressure"]), humidity
+        return temperature, shaped(instant["air_pressure"]), humidity
     profile = temperature.mean(axis=(1, 2))
     pressure = atmosphere.hydrostatic_pressure(instant["z"].values, profile)
     return temperature, pressure[:, None, None], humidity
 
 
-def _nodes(dataset: xr.Dataset, index: _Index, atmosphere: Atmosphere) -> tuple[FloatArray, FloatArray]:
+def _nodes(dataset: xr.Dataset, index: Index, atmosphere: Atmosphere) -> tuple[FloatArray, FloatArray]:
     """Heights and refractivity (nz, ny or 1, nx or 1) of a stored instant, with the ground below if known."""
-    instant = _at(dataset, index)
+    instant = at_instant(dataset, index, atmosphere)
     z = np.asarray(dataset["z"].values, dtype=np.float64)
-    if "air_temperature" not in dataset:
-        return z, _shaped(instant["air_refractivity"])
+    if not has_temperature(dataset):
+        return z, shaped(instant["air_refractivity"])
     temperature, pressure, humidity = _state(instant, atmosphere)
     air = atmosphere.refractivity(temperature, pressure, relative_humidity=humidity)
     if not _has_skin(instant):
         return z, air
-    surface = _shaped(instant["surface_temperature"].expand_dims("z"))
+    surface = shaped(instant["surface_temperature"].expand_dims("z"))
     # The air below the first node is hydrostatic too, at that node's temperature.
     column = atmosphere.hydrostatic_pressure(z[:1], temperature[:1].mean(axis=(1, 2)))
     base = pressure[:1] * (atmosphere.surface_pressure / column[0])
@@ -362,7 +350,7 @@ def _has_skin(instant: xr.Dataset) -> bool:
 
 
 def _mean_nodes(instant: xr.Dataset) -> FloatArray:
-    means = _shaped(instant["air_temperature"]).mean(axis=(1, 2))
+    means = shaped(instant["air_temperature"]).mean(axis=(1, 2))
     if not _has_skin(instant):
         return np.asarray(means)
     return np.concatenate([[float(instant["surface_temperature"].mean())], means])
@@ -373,25 +361,3 @@ def _horizontal(dataset: xr.Dataset, axis: str) -> FloatArray:
         return np.array([-UNBOUNDED, UNBOUNDED])
     values = np.asarray(dataset[axis].values, dtype=np.float64)
     return values if values.size > 1 else values[0] + np.array([-UNBOUNDED, UNBOUNDED])
-
-
-def _bracket(dataset: xr.Dataset, time: float) -> tuple[_Index, _Index, float]:
-    """Indices of the stored instants around `time` and the weight of the later one."""
-    if "time" not in dataset.dims:
-        return (), (), 0.0
-    times = np.asarray(dataset["time"].values, dtype=np.float64)
-    first, last = float(times[0]), float(times[-1])
-    if not first <= time <= last:
-        raise InputError(
-            "the air is not known at this time",
-            key="time",
-            value=float(time),
-            expected=f"from {first:g} s to {last:g} s"
-            if times.size > 1
-            else f"{first:g} s, its only instant",
-        )
-    upper = int(np.searchsorted(times, time))
-    if times[upper] == time:
-        return (upper,), (upper,), 0.0
-    weight = (time - times[upper - 1]) / (times[upper] - times[upper - 1])
-    return (upper - 1,), (upper,), float(weight)

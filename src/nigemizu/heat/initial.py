@@ -239,10 +239,19 @@ class Initial(Value):
 
         assert self.dataset is not None
         data = read_air(self.dataset)
-        if "time" in data.dims:
-            first = float(data["time"].values[0])
-            data = data.interp(time=first if self.dataset_time is None else self.dataset_time)
+        if "air_temperature" not in data:
+            raise InputError(
+                "the dataset tells no temperature without a pressure",
+                key="initial.dataset",
+                file=str(self.dataset),
+                expected="air_temperature, or air_potential_temperature and air_pressure",
+            )
         air = data["air_temperature"]
+        if "time" in air.dims:
+            stamps = air["time"].values
+            time = float(stamps[0]) if self.dataset_time is None else self.dataset_time
+            start = max(min(int(np.searchsorted(stamps, time)) - 1, stamps.size - 2), 0)
+            air = air.isel(time=slice(start, start + 2)).interp(time=time)  # no other instant is read
         for axis in ("z", "y", "x"):
             if axis not in air.dims:
                 air = air.expand_dims({axis: [0.0]})

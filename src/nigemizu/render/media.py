@@ -33,11 +33,11 @@ def axes_of(settings: Settings, resolve_air: AirResolver | None) -> Axes:
     # Late: the heat stage loads its compiler, which pictures without a dataset do not need.
     from nigemizu import heat
     from nigemizu.air import Atmosphere
+    from nigemizu.heat.reading.crop import split_crop
 
     name = str(settings.air)
-    path = Path(name)
-    if path.suffix.lower() in (".nc", ".zarr"):
-        return heat.refractivity_at(heat.read_air(path), settings.time, Atmosphere())
+    if Path(split_crop(name)[0]).suffix.lower() in (".nc", ".zarr"):
+        return heat.refractivity_at(heat.read_air(name), settings.time, Atmosphere())
     if resolve_air is not None:
         return resolve_air(name, settings.time)
     raise InputError(

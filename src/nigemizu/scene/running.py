@@ -133,19 +133,16 @@ def air_instants(
 def _volume(scene: Scene, dataset: xarray.Dataset, time: float) -> AirVolume:
     from nigemizu.heat import mean_temperature_at, refractivity_at
 
-    return AirVolume(*refractivity_at(dataset, time, scene.air), mean_temperature_at(dataset, time))
+    return AirVolume(
+        *refractivity_at(dataset, time, scene.air), mean_temperature_at(dataset, time, scene.air)
+    )
 
 
 def open_air(air: xarray.Dataset | str | os.PathLike[str]) -> xarray.Dataset:
     """The dataset, read when it is a file."""
     from nigemizu.heat import read_air
 
-    if isinstance(air, str | os.PathLike):
-        path = Path(air).expanduser()
-        if not path.exists():
-            raise InputError("no such dataset", key="air", value=str(path), expected="a .zarr or .nc dataset")
-        return read_air(path)
-    return air
+    return read_air(os.fspath(air)) if isinstance(air, str | os.PathLike) else air
 
 
 def checkpoints(scene: Scene, times: tuple[float, ...], folder: Path) -> Checkpoints | None:

@@ -64,6 +64,7 @@ class GroundLayer:
         self._shape = grid.shape[1:]
         self._half = 0.5 * float(grid.z_widths[0])
         self.rough = flow.ground == "rough"
+        self.holds = not isinstance(ground, FluxGround)
         if self.rough:
             self._momentum_log = math.log(self._half / flow.roughness)
             self._heat_log = math.log(self._half / (flow.roughness * OF_HEAT))

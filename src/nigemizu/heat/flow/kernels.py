@@ -181,15 +181,18 @@ def eddy_viscosity(first, last, u, v, w, nu, molecular, constant, rdx, rdy, dz, 
 
 
 @compiled(fastmath={"contract"})
-def fastest(first, last, u, v, w, nu, s, lift, largest, rdx, rdy, rdz, rdzf):  # type: ignore[no-untyped-def]
+def fastest(first, last, u, v, w, nu, s, lift, largest, upwards, rdx, rdy, rdz, rdzf):  # type: ignore[no-untyped-def]
     """Greatest rates [1/s] on the levels: of crossing cells, of diffusion across them, of buoyancy.
 
-    `largest` is the diffusivity of heat or momentum in units of the viscosity, whichever is more.
+    `largest` is the diffusivity of heat or momentum in units of the viscosity, whichever is more; `upwards`
+    counts diffusion along z, too.
     """
     ny, nx = nu.shape[1] - 4, nu.shape[2] - 4
     crossing, spreading, lifting = 0.0, 0.0, 0.0
     for k in range(first + 2, last + 2):
-        room = 4.0 * (rdx * rdx + rdy * rdy + max(rdzf[k], rdzf[k + 1]) * rdz[k]) * largest
+        room = 4.0 * (rdx * rdx + rdy * rdy) * largest
+        if upwards:
+            room += 4.0 * max(rdzf[k], rdzf[k + 1]) * rdz[k] * largest
         for j in range(2, ny + 2):
             for i in range(2, nx + 2):
                 rate = max(abs(u[k, j, i]), abs(u[k, j, i + 1])) * rdx

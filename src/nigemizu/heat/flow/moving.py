@@ -12,7 +12,7 @@ from typing import Any, Final, final
 import numpy as np
 
 from nigemizu.heat.boundary import GroundBoundary, Sides, Top
-from nigemizu.heat.flow import kernels, momentum
+from nigemizu.heat.flow import kernels, momentum, softening
 from nigemizu.heat.flow.ground import GroundLayer
 from nigemizu.heat.flow.padding import PAD, pad_ends, pad_sides, padded
 from nigemizu.heat.flow.pressure import Poisson
@@ -63,7 +63,8 @@ class MovingAir:
     with molecular and eddy viscosity ν and diffusivity κ. Finite volumes on a staggered mesh; the momentum by
     averages that conserve its energy, the temperature by limited third-order upwind values (or averages).
     Three stages of Williamson's Runge–Kutta scheme, each made free of divergence to round-off
-    (`nigemizu.heat.flow.pressure`): third order in the step, second in the cells.
+    (`nigemizu.heat.flow.pressure`): third order in the step, second in the cells. With eddies, what they
+    diffuse upwards and downwards is taken implicitly (`nigemizu.heat.flow.softening`).
 
     Limits: the density varies with the temperature only, by little, and in its weight alone (Boussinesq): for
     differences of some ten kelvin, and layers that are thin against 8 km. No moisture, no Coriolis force.
@@ -182,7 +183,7 @@ class MovingAir:
         # eddies conduct heat by 1/Pr_t of the viscosity, molecules by what they do
         prandtl = 1 / flow.turbulent_prandtl if flow.closure == "vreman" else 1.0
         largest = max(1.0, prandtl, self.diffusivity / max(flow.viscosity, 1e-300))
-        args = (self.u, self.v, self.w, self._nu, self.warmth, lift, largest)
+        args = (self.u, self.v, self.w, self._nu, self.warmth, lift, largest, flow.closure == "none")
         metric = (self._rdx, self._rdy, self._rdz, self._rdzf)
         found = self._levels(kernels.fastest, *args, *metric)
         crossing, spreading, lifting = np.max(np.array(found), axis=0)
@@ -199,13 +200,12 @@ class MovingAir:
         ground.
         """
         begin = self.time
-        fields = (self.u, self.v, self.w, self.warmth)
-        skip_x, skip_y = (int(wall) for wall in self.walls)
         for a, b, c in zip(_A, _B, _C, strict=True):
             self._push(a, step, begin + c * step)
-            skips = ((skip_x, 0, 0), (0, skip_y, 0), (0, 0, 1), (0, 0, 0))
-            for field, increment, skip in zip(fields, self._increments, skips, strict=True):
-                self._levels(kernels.add, field, increment, b, *skip)
+            if self.flow.closure == "none":
+                self._add(b)
+            else:
+                self._add_softly(b, b * step)
             self._fill()
             self._project()
         for field, mean in zip((self.u, self.v), mean_wind, strict=True):
@@ -213,6 +213,27 @@ class MovingAir:
                 field[INSIDE] += mean - self._mean(field)
         self._fill()
         self.time = begin + step
+
+    def _add(self, b: float) -> None:
+        skip_x, skip_y = (int(wall) for wall in self.walls)
+        skips = ((skip_x, 0, 0), (0, skip_y, 0), (0, 0, 1), (0, 0, 0))
+        fields = (self.u, self.v, self.w, self.warmth)
+        for field, increment, skip in zip(fields, self._increments, skips, strict=True):
+            self._levels(kernels.add, field, increment, b, *skip)
+
+    def _add_softly(self, b: float, time: float) -> None:
+        """The same with increments that vertical diffusion has softened."""
+        gu, gv, gw, gs = self._increments
+        flow, nu, metric = self.flow, self._nu, (self._rdz, self._rdzf)
+        skip_x, skip_y = (int(wall) for wall in self.walls)
+        drag = 0.0 if self._layer.rough else 2 * flow.viscosity * self._rdz[PAD]
+        held = 0.0 if self._layer.rough or not self._layer.holds else 2 * self.diffusivity * self._rdz[PAD]
+        momentum_ = (nu, flow.viscosity, 1.0, flow.viscosity, drag)
+        heat = (nu, flow.viscosity, 1 / flow.turbulent_prandtl, self.diffusivity, held)
+        self._rows(softening.add_softly, self.u, gu, b, time, *momentum_, skip_x, 0, *metric)
+        self._rows(softening.add_softly, self.v, gv, b, time, *momentum_, 0, skip_y, *metric)
+        self._rows(softening.add_softly_on_faces, self.w, gw, b, time, nu, *metric)
+        self._rows(softening.add_softly, self.warmth, gs, b, time, *heat, 0, 0, *metric)
 
     def _mean(self, field: np.ndarray) -> float:
         levels = field[INSIDE].mean(axis=(1, 2))
@@ -318,6 +339,10 @@ class MovingAir:
         results: list[Any] = []
         self._share(lambda first, last: results.append(kernel(first, last, *args)), self.grid.shape[0])
         return results
+
+    def _rows(self, kernel: Callable[..., Any], *args: Any) -> None:
+        """The same over all rows along x."""
+        self._share(lambda first, last: kernel(first, last, *args), self.grid.shape[1])
 
     def _share(self, work: Callable[[int, int], None], count: int) -> None:
         parts = min(self.workers, count)

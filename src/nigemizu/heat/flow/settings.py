@@ -6,7 +6,7 @@ from typing import Final, Literal, final
 
 from pydantic import Field
 
-from nigemizu.heat.measures import Kelvin, Metres, Seconds, SquareMetresPerSecond
+from nigemizu.heat.measures import KelvinDifference, Metres, Seconds, SquareMetresPerSecond
 from nigemizu.values import Value
 
 __all__ = ["VOLUMES", "Convection"]
@@ -71,6 +71,6 @@ class Convection(Value):
     courant: float = Field(default=1.0, gt=0, le=1.7)
     gravity: float = Field(default=9.80665, ge=0, json_schema_extra={"unit": "m/s2"})
     lapse_rate: float = Field(default=9.76e-3, ge=0, json_schema_extra={"unit": "K/m"})
-    noise: Kelvin = Field(default=0.01, ge=0)
+    noise: KelvinDifference = Field(default=0.01, ge=0)
     seed: int = Field(default=0, ge=0)
     checkpoint_every: Seconds | None = Field(default=None, gt=0)
