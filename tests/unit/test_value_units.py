@@ -29,6 +29,10 @@ COLOURS = {
 SHARES = {
     "Asphalt.contrast",
     "Camera.exposure",  # doublings
+    "Camera.f_number",
+    "Convection.closure_constant",
+    "Convection.courant",
+    "Convection.turbulent_prandtl",
     "Diffusivity.horizontal_factor",
     "Light.ground_albedo",
     "Light.sky_scale",
