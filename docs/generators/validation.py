@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from generators.flows import cavity, rolls
 from generators.text import heading, table, write_if_changed
 from nigemizu import air, field, heat, trace
 
@@ -33,6 +34,7 @@ def write(path: Path) -> None:
     for title, cases in (
         ("Refractive index of air", _refractivity()),
         ("Heat", _heat()),
+        ("Moving air", _flows()),
         ("Rays", _rays()),
     ):
         # The page must never show a deviation that the tests would not allow.
@@ -109,6 +111,20 @@ def _heat() -> list[Case]:
     what = "slab of 10 cm between 330 K and 300 K, its middle after 100 s"
     cases.append(Case(what, "Fourier series and image sum", 312.82222938774044, obtained, 2e-3, unit="K"))
     return cases
+
+
+def _flows() -> list[Case]:
+    spectral = "spectral Newton iteration; {}"
+    return [
+        Case(
+            "Nu of rolls, Ra = 10⁴, Pr = 0.71", spectral.format("Clever and Busse 1974 print 2.661"),
+            2.652502, rolls(1e4), 0.0265,
+        ),
+        Case(
+            "Nu of the heated cavity, Ra = 10⁴", spectral.format("de Vahl Davis 1983 prints 2.243"),
+            2.244816, cavity(1e4), 0.0224,
+        ),
+    ]  # fmt: skip
 
 
 def _rays() -> list[Case]:
