@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from nigemizu.cli.bench.timing import SELDOM, alternate
 from nigemizu.progress import SILENT, ProgressMeter
 
-__all__ = ["BYTES_PER_UPDATE", "copying", "hot_ground_in_wind", "measure_heat"]
+__all__ = ["BYTES_PER_UPDATE", "copying", "hot_ground_in_wind", "measure_convection", "measure_heat"]
 
 BYTES_PER_UPDATE = 16
 """One update reads and writes the temperature of a cell, in double precision, once at the very least."""
@@ -74,4 +75,57 @@ def measure_heat(
         "cell_updates_per_second": updates,
         "memory_copy_bytes_per_second": copied,
         "share_of_memory_copy": updates * BYTES_PER_UPDATE / copied,
+    }
+
+
+def measure_convection(
+    cells: tuple[int, int, int] = (128, 128, 64), steps: int = 3, *, progress: ProgressMeter = SILENT
+) -> dict[str, Any]:
+    """Cell-updates per second of air that moves by itself: eddies, rough ground, wind, stretched cells.
+
+    Parameters
+    ----------
+    cells : (int, int, int)
+        Number of cells along x, y and z.
+    steps : int
+        Steps that are timed at once, of three stages each.
+    progress : ProgressMeter
+
+    Returns
+    -------
+    dict
+        ``cell_updates_per_second`` [1/s], and ``volumes`` [1]: the most memory that was held by arrays, in
+        volumes of float64.
+    """
+    from nigemizu.heat import Convection, GridSpec, HeldGround, Quantity, Sides, Top
+    from nigemizu.heat.flow.moving import MovingAir
+
+    height = 6.0
+    grid = GridSpec(x=(0.0, 16.0), y=(0.0, 16.0), height=height, cells=cells, first_cell=height / 400).build()
+    random = np.random.default_rng(0)
+    temperature = random.normal(300.0, 0.5, grid.shape)
+    velocity = 0.2 * random.standard_normal((3, *grid.shape))
+    ground = HeldGround(temperature=Quantity(value=330.0))
+
+    def begin() -> MovingAir:
+        return MovingAir(grid, Convection(ground="rough"), ground, Sides(), Top(), 2.2e-5)
+
+    def advance(count: int) -> None:
+        for _ in range(count):
+            air.advance(air.longest_step(), (1.0, None))
+
+    with begin() as air:
+        air.set(temperature, (velocity[0], velocity[1], velocity[2]))
+        seconds = alternate({"steps": lambda: advance(steps)}, SELDOM, label="convection", progress=progress)
+    del air
+    tracemalloc.start()
+    with begin() as air:
+        air.set(temperature, (velocity[0], velocity[1], velocity[2]))
+        advance(1)
+        held = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return {
+        "cells": list(cells),
+        "cell_updates_per_second": temperature.size * steps / seconds["steps"],
+        "volumes": held / temperature.nbytes,
     }

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, final
 
 from nigemizu.cli.bench.fan import MOST_PANES, Fan, measure_panes, measure_ray_by_ray
-from nigemizu.cli.bench.heat import measure_heat
+from nigemizu.cli.bench.heat import measure_convection, measure_heat
 from nigemizu.cli.bench.memory import measure_memory
 from nigemizu.cli.bench.pictures import (
     fluctuating_road,
@@ -40,6 +40,7 @@ BENCHMARKS: Final = (
     "panes",
     "ray_by_ray",
     "heat",
+    "convection",
     "film",
     "growth",
     "memory",
@@ -70,7 +71,7 @@ class Sizes:
         Most panes that are tried.
     by_scipy : int
         Rays that SciPy follows.
-    heat : (int, int, int)
+    heat, convection : (int, int, int)
         Cells along x, y and z.
     frames : int
     often, seldom : int
@@ -91,6 +92,7 @@ class Sizes:
     panes: int = MOST_PANES
     by_scipy: int = 20
     heat: Nodes = (256, 128, 96)
+    convection: Nodes = (128, 128, 64)
     film: tuple[int, int] = (480, 270)
     frames: int = 3
     growth: tuple[int, int] = (480, 270)
@@ -184,6 +186,9 @@ class _Suite:
 
     def heat(self, progress: ProgressMeter) -> dict[str, Any]:
         return measure_heat(self._sizes.heat, progress=progress)
+
+    def convection(self, progress: ProgressMeter) -> dict[str, Any]:
+        return measure_convection(self._sizes.convection, progress=progress)
 
     def film(self, progress: ProgressMeter) -> dict[str, Any]:
         sizes = self._sizes

@@ -37,6 +37,7 @@ def rows(results: dict[str, Any]) -> list[Row]:
         *_panes(results["panes"]),
         _ray_by_ray(results["ray_by_ray"]),
         *_heat(results["heat"]),
+        _convection(results["convection"]),
         _film(results["film"]),
         *_memory(results["memory"]),
         *_growth(results["growth"]),
@@ -139,6 +140,15 @@ def _heat(found: dict[str, Any]) -> list[Row]:
         ),
         Row("  memory copy", f"{found['memory_copy_bytes_per_second'] / 1e9:.1f} GB/s"),
     ]
+
+
+def _convection(found: dict[str, Any]) -> Row:
+    nx, ny, nz = found["cells"]
+    return Row(
+        f"convection, {nx}×{ny}×{nz} cells",
+        f"{found['cell_updates_per_second'] / 1e6:.1f} million cell-updates/s",
+        f"holds {found['volumes']:.1f} volumes",
+    )
 
 
 def _film(found: dict[str, Any]) -> Row:
