@@ -43,6 +43,8 @@ SHARES = {
     "Texture.repeat",
     "Tracer.accuracy",  # in pixels or radians, as Tracer.accuracy_unit says
     "Tracer.chord_tolerance",  # of a pixel
+    "Turbulence.exponent",
+    "Turbulence.outer_scale_per_height",
     "Wind.exponent",
 }
 OF_THE_QUANTITY = {
@@ -57,6 +59,7 @@ OF_THE_QUANTITY = {
     "Rectangle.value",
     "Schedule.values",
     "Stripes.offsets",
+    "StructureTable.values",
     "Stripes.values",
 }
 """Numbers in the unit of the field that holds the quantity."""
@@ -151,4 +154,4 @@ def test_units_are_known() -> None:
         if (unit := field_unit(field)) is not None
     }
     alone = {unit for unit in units if len(accepted_units(unit)) == 1}
-    assert alone == {"W/m2/K", "kg/m3", "J/kg/K"}
+    assert alone == {"J/kg/K", "K/m", "K2 m-2/3", "W/m2/K", "kg/m3", "m-2/3", "m/s2"}

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     )
     from nigemizu.heat.solver import State, evolve, solve
     from nigemizu.heat.transport import Diffusivity, Wind
+    from nigemizu.heat.turbulence.field import TurbulentField
+    from nigemizu.heat.turbulence.settings import StructureTable, Turbulence
 
 __all__ = [
     "Checkpoints",
@@ -61,7 +63,10 @@ __all__ = [
     "Sides",
     "State",
     "Stripes",
+    "StructureTable",
     "Top",
+    "Turbulence",
+    "TurbulentField",
     "Unevenness",
     "Wind",
     "complete",
@@ -96,6 +101,8 @@ _HOMES: Final = {
         "Stripes",
     ),
     "transport": ("Diffusivity", "Wind"),
+    "turbulence.field": ("TurbulentField",),
+    "turbulence.settings": ("StructureTable", "Turbulence"),
 }
 
 

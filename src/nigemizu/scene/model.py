@@ -16,6 +16,7 @@ from nigemizu.heat.flow.settings import Convection
 from nigemizu.heat.grid import GridSpec
 from nigemizu.heat.initial import Initial
 from nigemizu.heat.transport import Diffusivity, Wind
+from nigemizu.heat.turbulence.settings import Turbulence
 from nigemizu.memory import available_memory
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.render import Camera, Light, Object
@@ -62,6 +63,8 @@ class Scene(Value):
         Whether heat spreads in air that the wind alone moves, or hot air rises, breaks up and mixes.
     convection : Convection
         How it does so.
+    turbulence : Turbulence, optional
+        Fluctuations that no grid computes, added where light passes.
     time, film, tracer : TimeSpec, FilmSpec, Tracer
         What is simulated, what a film shows, and how rays are followed.
     camera, light : Camera, Light
@@ -90,6 +93,7 @@ class Scene(Value):
     wind: Wind = Wind()
     process: Literal["diffusion", "convection"] = "diffusion"
     convection: Convection = Convection()
+    turbulence: Turbulence | None = None
     time: TimeSpec = TimeSpec()
     film: FilmSpec = FilmSpec()
     tracer: Tracer = Tracer()

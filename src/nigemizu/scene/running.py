@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from nigemizu.errors import InputError
 from nigemizu.memory import available_memory
 from nigemizu.progress import ProgressMeter
+from nigemizu.scene.turbulent import AddedTurbulence
 
 if TYPE_CHECKING:
     import xarray
@@ -114,6 +115,7 @@ def air_instants(
     """
     from nigemizu.heat import to_dataset
 
+    turbulence = AddedTurbulence(scene)
     if isinstance(air, AirVolume):  # air that does not change
         yield from (air for _ in times[first:])
         return
@@ -122,20 +124,20 @@ def air_instants(
         dataset = open_air(air)
         require_within(dataset, times)
         for time in times[first:]:
-            yield _volume(scene, dataset, time)
+            yield _volume(scene, dataset, time, turbulence)
         return
     grid = scene.grid.build()
     kept = None if folder is None else checkpoints(scene, times, folder)
     for state in _states(scene, times, progress, first, kept):
-        yield _volume(scene, to_dataset(grid, [state]), state.time)
+        yield _volume(scene, to_dataset(grid, [state]), state.time, turbulence)
 
 
-def _volume(scene: Scene, dataset: xarray.Dataset, time: float) -> AirVolume:
+def _volume(scene: Scene, dataset: xarray.Dataset, time: float, turbulence: AddedTurbulence) -> AirVolume:
     from nigemizu.heat import mean_temperature_at, refractivity_at
 
-    return AirVolume(
-        *refractivity_at(dataset, time, scene.air), mean_temperature_at(dataset, time, scene.air)
-    )
+    x, y, z, refractivity = refractivity_at(dataset, time, scene.air)
+    temperature = mean_temperature_at(dataset, time, scene.air)
+    return AirVolume(x, y, z, turbulence.to(x, y, z, refractivity, temperature, time), temperature)
 
 
 def open_air(air: xarray.Dataset | str | os.PathLike[str]) -> xarray.Dataset:
