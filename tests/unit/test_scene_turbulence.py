@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from nigemizu.errors import InputError
+from nigemizu.heat import TurbulentField
 from nigemizu.progress import SILENT
 from nigemizu.scene import Scene
 from nigemizu.scene.running import air_instants
@@ -30,7 +31,7 @@ def scene(**overrides: Any) -> Scene:
 
 
 def test_fluctuations_have_the_strength_that_was_asked_for() -> None:
-    """σ_n = (n − 1)/T σ_T with σ_T² = 0.154 C_T² L0^(2/3) on the nodes but for what the cells leave out.
+    """σ_n = (n − 1)/T σ_T, with the variance that the field expects of its cells.
 
     Negative control: four times the structure parameter gives twice the fluctuations.
     """
@@ -39,12 +40,12 @@ def test_fluctuations_have_the_strength_that_was_asked_for() -> None:
     assert air[0.4].temperature is not None
     level = int(np.argmin(np.abs(air[0.4].z - 1.0)))
     spread = {ct2: float((a.refractivity[level] - still.refractivity[level]).std()) for ct2, a in air.items()}
-    whole = (
-        np.sqrt(0.154 * 0.4 * 12.0 ** (2 / 3))
-        * still.refractivity[level].mean()
-        / air[0.4].temperature[level]
-    )
-    assert 0.6 * whole < spread[0.4] < 1.15 * whole
+    rough = scene(**ROUGH)
+    assert rough.turbulence is not None
+    variance = TurbulentField(rough.grid.build(), rough.turbulence, rough.wind).variance[level - 1]
+    expected = np.sqrt(variance) * still.refractivity[level].mean() / air[0.4].temperature[level]
+    assert 0.75 < spread[0.4] / expected < 1.3
+    assert variance < 0.154 * 0.4 * 12.0 ** (2 / 3)  # the cells leave some out
     assert 1.99 < spread[1.6] / spread[0.4] < 2.01
     # the skin of the ground is a node of its own
     assert np.array_equal(air[0.4].refractivity[0], still.refractivity[0])
@@ -62,7 +63,7 @@ def test_an_instant_is_the_same_whenever_it_is_asked_for() -> None:
     stored = rough.simulate([0.25, 0.5, 0.75])
     assert np.allclose(rough.air_at(0.5, air=stored).refractivity, film[1], rtol=0, atol=1e-12)
     # the dataset itself holds the air without it
-    assert float(stored["air_temperature"].isel(z=5).std()) < 1e-6
+    assert float(stored["air_temperature"].isel(time=0, z=5).std()) < 1e-6
     assert not np.allclose(film[0], film[1], rtol=0, atol=1e-8)
 
 
