@@ -29,6 +29,7 @@ _TABLE: Final[dict[str, dict[str, tuple[float, float]]]] = {
     "W/m2": {"W/m2": (1.0, 0.0), "kW/m2": (1e3, 0.0)},
     "W/m2/K": {"W/m2/K": (1.0, 0.0)},
     "m3/kg": {"m3/kg": (1.0, 0.0), "cm3/g": (1e-3, 0.0)},
+    "electrons": {"electrons": (1.0, 0.0), "electron": (1.0, 0.0), "e-": (1.0, 0.0)},
     "1": {"1": (1.0, 0.0), "%": (1e-2, 0.0), "ppm": (1e-6, 0.0)},
 }  # fmt: skip
 _ALIASES: Final[dict[str, str]] = {

@@ -230,6 +230,11 @@ def _picture(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="tell on stderr how the rays ended, how far they err, and the time",
     )
+    parser.add_argument(
+        "--truth",
+        action="store_true",
+        help="also write what each pixel sees: displacement, distance, turning height, the straight view",
+    )
 
 
 def _render(parser: argparse.ArgumentParser) -> None:

@@ -39,6 +39,8 @@ def render(options: argparse.Namespace) -> int:
     scene = _scene(options)
     common: dict[str, Any] = {"time": options.time, "air": options.air, "variant": options.variant}
     output = ready_to_write(_output(options, ".png"), (".png",) if options.compare else (".png", ".exr"))
+    if options.compare and options.truth:
+        raise InputError("--truth is of one picture", key="--compare", remedy="leave one of them out")
     if options.compare and options.stats:
         raise InputError("--stats tells of one picture", key="--compare", remedy="leave one of them out")
     demand_backend(options.variant)
@@ -48,7 +50,7 @@ def render(options: argparse.Namespace) -> int:
         if options.compare:
             written = scene.compare(output, **common, command=options.command, progress=progress)
         else:
-            picture = scene.render(**common, progress=progress)
+            picture = scene.render(**common, truth=options.truth, progress=progress)
             written = [picture.save(output, command=options.command)]
             stats.take(picture.statuses, picture.report)
     if options.stats:
@@ -74,6 +76,7 @@ def animate(options: argparse.Namespace) -> int:
             command=options.command,
             progress=progress,
             tell=stats.take,
+            truth=options.truth,
         )
     if options.stats:
         print(stats, file=sys.stderr)

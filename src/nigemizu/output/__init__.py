@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from nigemizu.output.files import ready_to_write, whole_file, whole_folder
     from nigemizu.output.film import write_film
     from nigemizu.output.frames import FrameFolder
+    from nigemizu.output.layers import read_layers, write_layers, write_pixels
     from nigemizu.output.pictures import encoded, read_picture, write_exr, write_picture, write_png
     from nigemizu.output.provenance import Provenance
     from nigemizu.output.side_view import DiagramRay, Outline, Profile, vanishing_line
@@ -26,6 +27,7 @@ __all__ = [
     "Provenance",
     "encoded",
     "ray_diagram",
+    "read_layers",
     "read_picture",
     "ready_to_write",
     "vanishing_line",
@@ -34,7 +36,9 @@ __all__ = [
     "write_air",
     "write_exr",
     "write_film",
+    "write_layers",
     "write_picture",
+    "write_pixels",
     "write_png",
 ]
 
@@ -44,6 +48,7 @@ _HOMES: Final = {
     "files": ("ready_to_write", "whole_file", "whole_folder"),
     "film": ("write_film",),
     "frames": ("FrameFolder",),
+    "layers": ("read_layers", "write_layers", "write_pixels"),
     "pictures": ("encoded", "read_picture", "write_exr", "write_picture", "write_png"),
     "provenance": ("Provenance",),
     "side_view": ("DiagramRay", "Outline", "Profile", "vanishing_line"),

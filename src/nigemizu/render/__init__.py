@@ -10,8 +10,10 @@ import importlib
 from typing import TYPE_CHECKING, Any, Final
 
 from nigemizu.render.camera import Camera
+from nigemizu.render.diffraction import diffract
 from nigemizu.render.light import Light
 from nigemizu.render.materials import Asphalt, Checker, Colour, Masonry, Material, Sand, Texture
+from nigemizu.render.noise import Noise, add_noise
 from nigemizu.render.objects import (
     Box,
     Ground,
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from nigemizu.render.media import medium_of
     from nigemizu.render.passes import Picture, picture
     from nigemizu.render.path_tracer import integrator
+    from nigemizu.render.sensors import lens_sensors
     from nigemizu.render.settings import Settings
     from nigemizu.render.variant import register, select_variant
 
@@ -49,6 +52,7 @@ __all__ = [
     "Material",
     "Mesh",
     "MitsubaFile",
+    "Noise",
     "Object",
     "Picture",
     "Pole",
@@ -59,8 +63,11 @@ __all__ = [
     "Sphere",
     "Texture",
     "Vehicle",
+    "add_noise",
     "build",
+    "diffract",
     "integrator",
+    "lens_sensors",
     "medium_of",
     "picture",
     "register",
@@ -75,6 +82,7 @@ _NEEDS_MITSUBA: Final = {
     "Settings": "settings",
     "build": "assembly",
     "integrator": "path_tracer",
+    "lens_sensors": "sensors",
     "medium_of": "media",
     "picture": "passes",
     "register": "variant",

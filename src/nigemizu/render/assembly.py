@@ -30,6 +30,7 @@ from nigemizu.render.objects import (
     Sphere,
     Vehicle,
 )
+from nigemizu.render.sensors import sensor
 from nigemizu.render.sky import bake
 
 __all__ = ["build"]
@@ -74,7 +75,7 @@ def build(camera: Camera, light: Light, objects: Sequence[Object], *, integrator
     scene: dict[str, Any] = {
         "type": "scene",
         "integrator": integrator,
-        "sensor": _sensor(camera),
+        "sensor": sensor(camera),
         **bake(light).emitters(),
     }
     for index, item in enumerate(objects):
@@ -84,6 +85,9 @@ def build(camera: Camera, light: Light, objects: Sequence[Object], *, integrator
 
 
 def _check_eye(camera: Camera, objects: Sequence[Object]) -> None:
+    if camera.target is not None and camera.target == camera.eye:
+        raise InputError("the camera looks at its own eye", key="camera.target", value=camera.target)
+    lens = camera.aperture_diameter / 2 * math.hypot(*camera.direction[:2])
     for item in objects:
         if isinstance(item, Ground) and camera.eye[2] <= item.height:
             raise InputError(
@@ -92,33 +96,13 @@ def _check_eye(camera: Camera, objects: Sequence[Object]) -> None:
                 value=camera.eye,
                 expected=f"z above {item.height} m",
             )
-    if camera.target is not None and camera.target == camera.eye:
-        raise InputError("the camera looks at its own eye", key="camera.target", value=camera.target)
-
-
-def _sensor(camera: Camera) -> dict[str, Any]:
-    eye, direction = np.asarray(camera.eye), np.asarray(camera.direction)
-    up = [0.0, 0.0, 1.0] if math.hypot(direction[0], direction[1]) > 1e-6 else [1.0, 0.0, 0.0]
-    return {
-        "type": "perspective",
-        "fov": camera.field_of_view,
-        "fov_axis": "x",
-        "near_clip": 1e-2,
-        "far_clip": 1e8,
-        "to_world": mi.ScalarTransform4f().look_at(
-            origin=eye.tolist(), target=(eye + direction).tolist(), up=up
-        ),
-        "film": {
-            "type": "hdrfilm",
-            "width": camera.width,
-            "height": camera.height,
-            "rfilter": {"type": camera.filter},
-            "pixel_format": "rgb",
-            "component_format": "float32",
-        },
-        # Stratified: which light a sample draws is spread evenly over the samples of a pixel.
-        "sampler": {"type": "multijitter", "sample_count": min(camera.samples, 64)},
-    }
+        if isinstance(item, Ground) and camera.eye[2] - lens <= item.height:
+            raise InputError(
+                "the aperture reaches into the ground",
+                key="camera.eye",
+                value=camera.eye,
+                expected=f"z above {item.height + lens:g} m, or a smaller aperture",
+            )
 
 
 def _shapes(item: Object, key: str, camera: Camera) -> dict[str, Any]:

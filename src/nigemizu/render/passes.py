@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final, final
 
@@ -18,9 +19,29 @@ from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.render.path_tracer import STATUSES
 from nigemizu.render.report import ErrorReport
 
-__all__ = ["Picture", "picture"]
+__all__ = ["Picture", "Shot", "picture"]
 
 _PASS_RAYS: Final = 2**22  # rays per pass: a pass takes a second or so, and little memory
+
+
+@final
+@dataclass(frozen=True)
+class Shot:
+    """A part of a picture: its share of the samples, seen from its own sensor.
+
+    Parameters
+    ----------
+    samples : int
+        Rays per pixel.
+    sensor : mi.Sensor, optional
+        Default: the scene's first.
+    weight : float
+        Share in the picture, relative to the others.
+    """
+
+    samples: int
+    sensor: Any = None
+    weight: float = 1.0
 
 
 @final
@@ -57,6 +78,7 @@ def picture(
     seed: int = 0,
     frame: int = 0,
     exposure: float = 0.0,
+    shots: Iterable[Shot] | None = None,
     progress: ProgressMeter = SILENT,
 ) -> Picture:
     """Render a Mitsuba scene in passes of a few samples per pixel.
@@ -71,46 +93,86 @@ def picture(
         Each (seed, frame, pass) draws its own random numbers, on whichever worker it is rendered.
     exposure : float, stops
         Factor 2^exposure on the radiance.
+    shots : iterable of Shot, optional
+        Parts that the picture is the weighted mean of, with `samples` rays per pixel together. Each is taken
+        from the iterable when those before it are rendered, so that a generator can put other air in between.
+        Default: one shot.
     progress : ProgressMeter
         Advances by the samples per pixel of each pass; interruptible between passes.
 
     Returns
     -------
     Picture
+        Its report is the joined one of the first, second, fourth, eighth … shot.
     """
     if samples < 1:
         raise InputError("at least one sample per pixel is needed", key="samples", value=samples)
     began = time.perf_counter()
-    integrator, sensor = scene.integrator(), scene.sensors()[0]
-    counted = hasattr(integrator, "reset_counts")
-    if counted:
-        integrator.reset_counts()
-        integrator.planned = samples
-    width, height = (int(length) for length in sensor.film().crop_size())
-    total = np.zeros((height, width, 3), dtype=np.float64)
+    exposing = _Exposing(scene, [seed, frame], progress)
     progress.start("rendering", samples)
     try:
-        for index, count in enumerate(_passes(samples, width * height)):
-            state = np.random.SeedSequence([seed, frame, index]).generate_state(1)[0]
-            # Opaque: a number known to the compiler would be compiled in, again for every pass.
-            opaque = dr.opaque(mi.UInt32, int(state))
-            image = integrator.render(scene, sensor, seed=opaque, spp=count)
-            _take_interrupts_back()
-            if integrator.should_stop():  # Mitsuba keeps Ctrl-C to itself while it renders
-                raise KeyboardInterrupt
-            total += np.asarray(image, dtype=np.float64)[..., :3] * count
-            progress.advance(count)
+        for shot in (Shot(samples),) if shots is None else shots:
+            exposing.add(shot, 2.0**exposure)
     finally:
         progress.finish()
-    counts = np.asarray(integrator.counts) if counted else ()
-    radiance = np.asarray(total * (2.0**exposure / samples), dtype=np.float32)
+    counts = exposing.counts()
     return Picture(
-        radiance=radiance,
+        radiance=np.asarray(exposing.total / exposing.weight, dtype=np.float32),
         statuses={name: int(number) for name, number in zip(STATUSES, counts, strict=False)},
         samples=samples,
         seconds=time.perf_counter() - began,
-        report=integrator.report(scene, sensor) if counted else None,
+        report=ErrorReport.joined(exposing.reports) if exposing.reports else None,
     )
+
+
+@final
+class _Exposing:
+    """A picture under way: light is added, shot by shot and pass by pass."""
+
+    def __init__(self, scene: Any, seeds: list[int], progress: ProgressMeter) -> None:
+        self._scene, self._seeds, self._progress = scene, seeds, progress
+        self._integrator, self._sensor = scene.integrator(), scene.sensors()[0]
+        self._counted = hasattr(self._integrator, "reset_counts")
+        if self._counted:
+            self._integrator.reset_counts()
+        width, height = (int(length) for length in self._sensor.film().crop_size())
+        self._passes, self._shots = 0, 0
+        self.total = np.zeros((height, width, 3), dtype=np.float64)
+        self.weight = 0.0
+        self.reports: list[ErrorReport] = []
+
+    def add(self, shot: Shot, factor: float) -> None:
+        """Render a shot; `factor` multiplies its light."""
+        sensor = self._sensor if shot.sensor is None else shot.sensor
+        height, width, _ = self.total.shape
+        if self._counted:
+            self._integrator.planned = shot.samples
+        part = np.zeros_like(self.total)
+        for count in _passes(shot.samples, width * height):
+            part += self._pass(sensor, count) * count
+        self.total += part * (shot.weight * factor / shot.samples)
+        self.weight += shot.weight
+        self._shots += 1
+        # Measuring takes as long as some passes: with many shots it is done for ever fewer of them.
+        if self._counted and self._shots & (self._shots - 1) == 0:
+            report = self._integrator.report(self._scene, sensor)
+            self.reports += [] if report is None else [report]
+
+    def counts(self) -> Any:
+        """Camera rays per entry of `STATUSES`."""
+        return np.asarray(self._integrator.counts) if self._counted else ()
+
+    def _pass(self, sensor: Any, count: int) -> NDArray[np.float64]:
+        state = np.random.SeedSequence([*self._seeds, self._passes]).generate_state(1)[0]
+        # Opaque: a number known to the compiler would be compiled in, again for every pass.
+        opaque = dr.opaque(mi.UInt32, int(state))
+        image = self._integrator.render(self._scene, sensor, seed=opaque, spp=count)
+        _take_interrupts_back()
+        if self._integrator.should_stop():  # Mitsuba keeps Ctrl-C to itself while it renders
+            raise KeyboardInterrupt
+        self._passes += 1
+        self._progress.advance(count)
+        return np.asarray(image, dtype=np.float64)[..., :3]
 
 
 def _take_interrupts_back() -> None:

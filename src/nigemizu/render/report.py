@@ -16,6 +16,7 @@ from nigemizu.render.bending import Bending
 __all__ = ["ErrorReport", "measure"]
 
 _RAYS: Final = 1024
+_STRIDE: Final = 389  # has no divisor in common with the number of rays
 _FINER: Final = 1 / 50  # of the accuracy asked for, for the paths that the picture's are compared with
 _NEARBY: Final = 0.02  # pixels, from a ray to its neighbours
 _STEPS: Final = 200_000
@@ -57,6 +58,8 @@ class ErrorReport:
     def joined(reports: Iterable[ErrorReport]) -> ErrorReport:
         """Of several pictures: the worst of all, and the means."""
         entries = list(reports)
+        if len(entries) == 1:
+            return entries[0]
 
         def mean(name: str) -> float:
             return float(np.mean([getattr(entry, name) for entry in entries]))
@@ -130,9 +133,12 @@ def measure(bending: Bending, scene: Any, sensor: Any) -> ErrorReport | None:
 
 
 def _spread(sensor: Any) -> Any:
-    """Rays through places spread evenly over the film."""
+    """Rays through places spread evenly over the film and the aperture."""
     u, v = trace.spread(_RAYS)
-    ray, _ = sensor.sample_ray_differential(0.0, 0.5, mi.Point2f(mi.Float(u), mi.Float(v)), mi.Point2f(0.5))
+    # Another order of the same places: one on the aperture tells nothing of that on the film.
+    other = np.arange(_RAYS) * _STRIDE % _RAYS
+    places, lens = (mi.Point2f(mi.Float(a), mi.Float(b)) for a, b in ((u, v), (u[other], v[other])))
+    ray, _ = sensor.sample_ray_differential(0.0, 0.5, places, lens)
     dr.eval(ray)
     return ray
 

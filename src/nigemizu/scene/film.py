@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import multiprocessing
 import os
 import shutil
@@ -16,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from nigemizu.errors import MachineError
+from nigemizu.errors import InputError, MachineError
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.scene.digest import air_digest
 from nigemizu.scene.rendering import Studio, warn_of_errors, warn_of_lost_rays
@@ -29,7 +30,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Tell", "animate", "frames_folder"]
 
-_Job: TypeAlias = tuple[int, AirVolume | None, Path]
+_Air: TypeAlias = AirVolume | tuple[AirVolume, ...] | None
+_Job: TypeAlias = "tuple[int, _Air, Path, _Truth | None]"
+_Truth: TypeAlias = tuple[Path, float]
 _Outcome: TypeAlias = "tuple[dict[str, int], ErrorReport | None]"
 Tell: TypeAlias = "Callable[[Mapping[str, int], ErrorReport | None], None]"
 
@@ -43,6 +46,8 @@ def animate(
     command: str,
     progress: ProgressMeter,
     tell: Tell | None = None,
+    *,
+    truth: bool = False,
 ) -> Path:
     """See `nigemizu.scene.Scene.animate`."""
     from nigemizu.output import FrameFolder, Provenance, ready_to_write, write_film
@@ -64,10 +69,11 @@ def animate(
         Provenance(scene=shown.to_toml()),
         inputs=None if digest is None else {"air": digest},
     )
-    missing = folder.missing()
+    truths = path.with_name(f"{path.stem}_truth") if truth else None
+    missing = _missing(folder, truths)
     progress.start("frames", folder.count)
     progress.advance(folder.count - len(missing))
-    jobs = _jobs(scene, folder, missing, air)
+    jobs = _jobs(scene, folder, missing, air, truths)
     if workers == 1:
         outcomes = _render_here(scene, jobs, variant, progress)
     else:
@@ -95,15 +101,28 @@ def _air_folder(frames: Path) -> Path:
 
 def _require_instants(scene: Scene, air: AirSource) -> None:
     """Refuse what cannot be shown before the first frame is rendered and anything is written."""
+    exposures = _exposures(scene)
     if isinstance(air, AirVolume):
         return
     if air is not None:
-        require_within(open_air(air), scene.film.times)
+        require_within(open_air(air), tuple(itertools.chain(*exposures)))
     elif scene.tracer.method != "straight":
         scene.initial.sample(scene.grid.build())
 
 
-def _jobs(scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSource) -> Iterator[_Job]:
+def _missing(folder: FrameFolder, truths: Path | None) -> list[int]:
+    """Frames that are not there yet, or whose ground truth is not."""
+    if truths is None:
+        return folder.missing()
+    truths.mkdir(exist_ok=True)
+    there = {path.stem for path in truths.glob("*.nc")} & {path.stem for path in truths.glob("*.exr")}
+    absent = {number for number, frame in enumerate(folder.frames()) if frame.stem not in there}
+    return sorted(absent | set(folder.missing()))
+
+
+def _jobs(
+    scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSource, truths: Path | None
+) -> Iterator[_Job]:
     """The frames that are missing, with their air.
 
     The heat stage runs from the beginning even when only the last frame is missing, or from a checkpoint of
@@ -112,15 +131,54 @@ def _jobs(scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSou
     if not missing:
         return
     if scene.tracer.method == "straight":
-        yield from ((index, None, folder.frame(index)) for index in missing)
+        yield from (_job(scene, folder, index, None, truths) for index in missing)
         return
     wanted = frozenset(missing)
-    times = scene.film.times[: missing[-1] + 1]
+    exposures = _exposures(scene)
+    each = len(exposures[0])
+    times = tuple(itertools.chain(*exposures[: missing[-1] + 1]))
     kept = _air_folder(folder.path)
-    instants = air_instants(scene, times, air, SILENT, first=missing[0], folder=kept)
-    for index, volume in enumerate(instants, start=missing[0]):
+    instants = air_instants(scene, times, air, SILENT, first=each * missing[0], folder=kept)
+    for index in range(missing[0], missing[-1] + 1):
+        airs = tuple(itertools.islice(instants, each))
         if index in wanted:
-            yield index, volume, folder.frame(index)
+            yield _job(scene, folder, index, airs[0] if each == 1 else airs, truths)
+
+
+def _job(scene: Scene, folder: FrameFolder, index: int, air: _Air, truths: Path | None) -> _Job:
+    frame = folder.frame(index)
+    return index, air, frame, None if truths is None else (truths / frame.stem, scene.film.times[index])
+
+
+def _take(studio: Studio, job: _Job, progress: ProgressMeter) -> _Outcome:
+    """Render a frame; it is written last, so that one that is there is complete."""
+    index, air, frame, truth = job
+    picture = studio.shoot(air, frame=index, progress=progress)
+    if truth is not None:
+        stem, time = truth
+        studio.truth(picture, air, time, frame=index).save(stem)
+    picture.save(frame)
+    return picture.statuses, picture.report
+
+
+def _exposures(scene: Scene) -> list[tuple[float, ...]]:
+    """The instants [s] of the air that each frame looks through.
+
+    Raises
+    ------
+    InputError
+        If a frame is exposed for longer than it takes to the next.
+    """
+    exposures = [scene.camera.instants(time) for time in scene.film.times]
+    for one, other in itertools.pairwise(exposures):
+        if other[0] <= one[-1]:
+            raise InputError(
+                "is longer than a frame of the film",
+                key="camera.shutter",
+                value=scene.camera.shutter,
+                expected=f"less than {scene.film.times[1] - scene.film.times[0]:.4g} s",
+            )
+    return exposures
 
 
 def _joined(outcomes: Sequence[_Outcome]) -> _Outcome:
@@ -137,11 +195,9 @@ def _render_here(
 ) -> list[_Outcome]:
     studio: Studio | None = None
     outcomes = []
-    for index, air, frame in jobs:
+    for job in jobs:
         studio = studio or Studio(scene, variant)
-        picture = studio.shoot(air, frame=index, progress=progress)
-        picture.save(frame)
-        outcomes.append((picture.statuses, picture.report))
+        outcomes.append(_take(studio, job, progress))
         progress.advance()
     return outcomes
 
@@ -204,10 +260,7 @@ def _prepare_process() -> None:
 
 
 def _render_one(toml: str, variant: Variant, threads: int, job: _Job) -> _Outcome:
-    index, air, frame = job
-    picture = _studio(toml, variant, threads).shoot(air, frame=index)
-    picture.save(frame)
-    return picture.statuses, picture.report
+    return _take(_studio(toml, variant, threads), job, SILENT)
 
 
 @functools.cache

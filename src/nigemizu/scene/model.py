@@ -241,6 +241,7 @@ class Scene(Value):
         air: AirSource = None,
         method: str | None = None,
         samples: int | None = None,
+        truth: bool = False,
         variant: Variant = "auto",
         progress: ProgressMeter = SILENT,
     ) -> RenderedPicture:
@@ -256,6 +257,8 @@ class Scene(Value):
             How light travels, instead of ``tracer.method``.
         samples : int, optional
             Rays per pixel, instead of ``camera.samples``.
+        truth : bool
+            Whether to find out what each pixel sees, too (`nigemizu.scene.truth`).
         variant : {"auto", "llvm", "cuda"}
             Compute device; one per process.
         progress : ProgressMeter
@@ -268,7 +271,7 @@ class Scene(Value):
         """
         from nigemizu.scene import rendering
 
-        return rendering.render(self._seen(method, samples), time, air, variant, progress)
+        return rendering.render(self._seen(method, samples), time, air, variant, progress, truth=truth)
 
     def compare(
         self,
@@ -310,6 +313,7 @@ class Scene(Value):
         command: str = "",
         progress: ProgressMeter = SILENT,
         tell: Tell | None = None,
+        truth: bool = False,
     ) -> Path:
         """Render the film `film` into an MP4 and a folder of numbered frames beside it.
 
@@ -322,8 +326,8 @@ class Scene(Value):
         workers : int
             Processes that render. More than one needs the calling script to protect its main part with
             ``if __name__ == "__main__":``.
-        air, method, samples, variant, progress
-            As for `render`.
+        air, method, samples, variant, progress, truth
+            As for `render`; ground truth goes into a folder ``NAME_truth`` beside the film.
         command : str
             Kept in the film's header: how it was made.
         tell : callable, optional
@@ -337,7 +341,7 @@ class Scene(Value):
         from nigemizu.scene import film
 
         seen = self._seen(method, samples)
-        return film.animate(seen, Path(path), air, workers, variant, command, progress, tell)
+        return film.animate(seen, Path(path), air, workers, variant, command, progress, tell, truth=truth)
 
     def trace(
         self,
@@ -372,16 +376,9 @@ class Scene(Value):
         """
         from nigemizu.scene import rays
 
-        return rays.trace(
-            self._seen(method, None),
-            elevations,
-            azimuths,
-            time=time,
-            air=air,
-            paths=paths,
-            variant=variant,
-            progress=progress,
-        )
+        seen = self._seen(method, None)
+        options: dict[str, Any] = {"variant": variant, "progress": progress}
+        return rays.trace(seen, elevations, azimuths, time=time, air=air, paths=paths, **options)
 
     def _seen(self, method: str | None, samples: int | None) -> Scene:
         changes = {"tracer.method": method, "camera.samples": samples}

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, final
 
-from nigemizu.errors import NigemizuWarning
+from nigemizu.errors import InputError, NigemizuWarning
 from nigemizu.progress import SILENT, ProgressMeter
 from nigemizu.scene.picture import RenderedPicture
-from nigemizu.scene.running import AirSource, AirVolume, Variant, air_at
+from nigemizu.scene.running import AirSource, AirVolume, Variant, air_at, air_instants
 
 if TYPE_CHECKING:
+    from nigemizu.render.passes import Shot
     from nigemizu.render.report import ErrorReport
     from nigemizu.scene.model import Scene
+    from nigemizu.scene.truth import PictureTruth
 
 __all__ = ["Studio", "render", "warn_of_errors", "warn_of_lost_rays"]
 
@@ -36,13 +39,16 @@ class Studio:
     """
 
     def __init__(self, scene: Scene, variant: Variant) -> None:
-        from nigemizu.render import Settings, build, integrator, select_variant
+        from nigemizu.render import Settings, build, integrator, lens_sensors, select_variant
 
         select_variant(variant)
-        self._scene = scene
+        self._scene, self._variant = scene, variant
+        self._without_air: Studio | None = None
         settings = Settings(tracer=scene.tracer, visibility=scene.light.visibility)
         self._integrator = integrator(settings=settings)
         self._built = build(scene.camera, scene.light, scene.objects, integrator=self._integrator)
+        # None stands for the sensor of the built scene itself.
+        self._lens: list[Any] = lens_sensors(scene.camera) or [None]
 
     @property
     def surfaces(self) -> Any:
@@ -52,41 +58,171 @@ class Studio:
         return surface_query(self._built)
 
     def shoot(
-        self, air: AirVolume | None, *, frame: int = 0, progress: ProgressMeter = SILENT
+        self,
+        air: AirVolume | Iterable[AirVolume] | None,
+        *,
+        weights: Sequence[float] | None = None,
+        frame: int = 0,
+        progress: ProgressMeter = SILENT,
     ) -> RenderedPicture:
-        """Render the scene through `air` (None: no air); each `frame` draws its own random numbers."""
-        from nigemizu.render import medium_of, picture
+        """Render the scene through air.
+
+        Parameters
+        ----------
+        air : AirVolume, or iterable of AirVolume, or None
+            Air that stands still during the exposure; or that of each of its instants
+            (`nigemizu.render.Camera.instants`), among which the samples are divided, and of which one at a
+            time is held; or no air.
+        weights : sequence of float, optional
+            Share of each instant in the picture, relative to the others. Default: all the same.
+        frame : int
+            Each draws its own random numbers.
+        progress : ProgressMeter
+            Receives how far the work has come.
+        """
+        from nigemizu.render import add_noise, diffract, picture
+        from nigemizu.render.diffraction import WAVELENGTHS
 
         scene, camera = self._scene, self._scene.camera
-        if air is None:
-            self._integrator.set_medium(None)
-        else:
-            angle = scene.tracer.angle(camera.pixel_angle)
-            make = partial(medium_of, *air[:4], tracer=scene.tracer, angle=angle)
-            self._integrator.set_medium(make(), partial(make, precision="double", storage="single"))
+        airs = [air] if air is None or isinstance(air, AirVolume) else air
+        shares = _shares(airs, weights, len(camera.instants(0.0)))
         taken = picture(
             self._built,
-            samples=camera.samples,
+            samples=max(camera.samples, len(shares)),
             seed=camera.seed,
             frame=frame,
             exposure=camera.exposure,
+            shots=self._shots(airs, shares),
             progress=progress,
         )
-        return RenderedPicture(taken.radiance, taken.statuses, scene, taken.report)
+        noiseless = taken.radiance
+        if camera.diffraction:
+            noiseless = diffract(noiseless, [camera.airy_scale(wavelength) for wavelength in WAVELENGTHS])
+        if camera.noise is None:
+            return RenderedPicture(noiseless, taken.statuses, scene, taken.report)
+        pixels = add_noise(noiseless, camera.noise, seed=camera.seed, frame=frame)
+        return RenderedPicture(pixels, taken.statuses, scene, taken.report, noiseless)
+
+    def truth(
+        self,
+        picture: RenderedPicture,
+        air: AirVolume | Sequence[AirVolume] | None,
+        time: float,
+        *,
+        frame: int = 0,
+    ) -> PictureTruth:
+        """What each pixel of the picture taken last sees, and the picture without air.
+
+        Parameters
+        ----------
+        picture : RenderedPicture
+        air : AirVolume, or sequence of AirVolume, or None
+            As for `shoot`; of several instants the one in the middle counts.
+        time : float, s
+            When the picture was taken.
+        frame : int
+        """
+        from nigemizu.render.sensors import pinhole_sensor
+        from nigemizu.render.truth import ground_truth
+        from nigemizu.scene.truth import PictureTruth
+
+        self._set_air(air if air is None or isinstance(air, AirVolume) else air[len(air) // 2])
+        # Through the middle of the aperture, where there is one.
+        layers = ground_truth(self._integrator.bending, self._built, pinhole_sensor(self._scene.camera))
+        if self._without_air is None:
+            straight = self._scene.with_changes({"tracer.method": "straight"})
+            self._without_air = Studio(straight, self._variant)
+        straight_picture = self._without_air.shoot(None, frame=frame)
+        return PictureTruth(layers, picture.noiseless, straight_picture.noiseless, time, self._scene)
+
+    def _shots(self, airs: Iterable[AirVolume | None], shares: Sequence[float]) -> Iterator[Shot]:
+        """The parts of a picture: of each instant, from each of its points on the aperture."""
+        from nigemizu.render.passes import Shot
+
+        instants, lens = len(shares), self._lens
+        samples = _divided(self._scene.camera.samples, instants)
+        given = 0
+        for index, air in enumerate(airs):
+            given += 1
+            if given > instants:
+                break
+            self._set_air(air)
+            # Every so many points for each instant: the sequence fills the aperture with any of its parts.
+            points = lens[index % len(lens) :: instants][: samples[index]]
+            for sensor, count in zip(points, _divided(samples[index], len(points)), strict=True):
+                yield Shot(count, sensor, shares[index] * count / samples[index])
+        if given != instants:
+            raise InputError(
+                "one air per instant is needed",
+                key="air",
+                value=f"{given}{' or more' if given > instants else ''}",
+                expected=f"{instants}",
+            )
+
+    def _set_air(self, air: AirVolume | None) -> None:
+        from nigemizu.render import medium_of
+
+        if air is None:
+            self._integrator.set_medium(None)
+            return
+        tracer = self._scene.tracer
+        make = partial(medium_of, *air[:4], tracer=tracer, angle=tracer.angle(self._scene.camera.pixel_angle))
+        self._integrator.set_medium(make(), partial(make, precision="double", storage="single"))
+
+
+def _shares(
+    airs: Iterable[AirVolume | None], weights: Sequence[float] | None, instants: int
+) -> tuple[float, ...]:
+    """The weight of each instant, adding up to 1."""
+    if weights is None:
+        count = len(airs) if isinstance(airs, Sequence) else instants
+        weights = [1.0] * count
+    if not weights or min(weights) < 0 or not 0 < sum(weights) < float("inf"):
+        raise InputError(
+            "no shares of a picture", key="weights", value=list(weights), expected="numbers ≥ 0, some above 0"
+        )
+    return tuple(weight / sum(weights) for weight in weights)
+
+
+def _divided(samples: int, parts: int) -> list[int]:
+    """Samples per pixel of each part: equal as far as possible, one at least."""
+    whole, rest = divmod(samples, parts)
+    return [max(1, whole + (part < rest)) for part in range(parts)]
 
 
 def render(
-    scene: Scene, time: float | None, air: AirSource, variant: Variant, progress: ProgressMeter
+    scene: Scene,
+    time: float | None,
+    air: AirSource,
+    variant: Variant,
+    progress: ProgressMeter,
+    *,
+    truth: bool = False,
 ) -> RenderedPicture:
     """See `nigemizu.scene.Scene.render`."""
     scene.check()
     studio = Studio(scene, variant)
-    volume = None if scene.tracer.method == "straight" else air_at(scene, time, air, progress)
-    picture = studio.shoot(volume, progress=progress)
+    airs = _airs(scene, time, air, progress)
+    picture = studio.shoot(airs, progress=progress)
+    if truth:
+        shown = scene.time.shown if time is None else time
+        picture = replace(picture, truth=studio.truth(picture, airs, shown))
     warn_of_lost_rays(picture.statuses, scene)
     if picture.report is not None:
         warn_of_errors(picture.report, scene)
     return picture
+
+
+def _airs(
+    scene: Scene, time: float | None, air: AirSource, progress: ProgressMeter
+) -> AirVolume | tuple[AirVolume, ...] | None:
+    """The air that one picture is seen through, at each instant of its exposure if it moves."""
+    if scene.tracer.method == "straight":
+        return None
+    if scene.camera.shutter == 0 or isinstance(air, AirVolume):
+        return air_at(scene, time, air, progress)
+    instants = scene.camera.instants(scene.time.shown if time is None else time)
+    return tuple(air_instants(scene, instants, air, progress))
 
 
 def warn_of_errors(report: ErrorReport, scene: Scene) -> None:
