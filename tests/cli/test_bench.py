@@ -33,7 +33,7 @@ TINY = Sizes(
     panes=512,
     by_scipy=2,
     heat=(16, 16, 24),
-    convection=(8, 8, 12),
+    convection=(8, 8, 16),
     film=(32, 18),
     frames=1,
     growth=(24, 14),
@@ -139,7 +139,19 @@ def test_the_table_prints_every_row(results: Results) -> None:
         assert any(row.figure in line for line in mine), row
     assert lines[0].startswith(f"{results['machine']['cores']} cores of ")
     assert results["machine"]["llvm"] in lines[1]
-    named = ("pyramid", "road", "march", "stratified", "panes", "DOP853", "heat", "convection", "film", "memory", "grows")
+    named = (
+        "pyramid",
+        "road",
+        "march",
+        "stratified",
+        "panes",
+        "DOP853",
+        "heat",
+        "convection",
+        "film",
+        "memory",
+        "grows",
+    )
     assert [word for word in named if word not in text] == []
 
 

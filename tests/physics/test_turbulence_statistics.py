@@ -246,7 +246,7 @@ BOX = GridSpec(x=(0, 4), y=(0, 2), height=2.0, cells=(64, 33, 8)).build()
 
 def test_frozen_turbulence_is_shifted_by_the_wind():
     wind = Wind(speed=1.3, direction=30.0, shear="log", reference_height=2.0)
-    field = TurbulentField(BOX, Turbulence(ct2=0.1, outer_scale=1.0, eddy_lifetime=None), wind)
+    field = TurbulentField(BOX, Turbulence(ct2=0.1, outer_scale=1.0, eddy_lifetime="frozen"), wind)
     start, time = field.at(0.0), 0.777
     u, v = wind.velocity(BOX.z)
     kx = 2 * math.pi / 4 * np.fft.fftfreq(64, 1 / 64)
@@ -256,7 +256,7 @@ def test_frozen_turbulence_is_shifted_by_the_wind():
     np.testing.assert_allclose(field.at(time), moved, atol=1e-12)
     assert np.max(np.abs(field.at(time) - np.fft.ifft2(np.fft.fft2(start) / turn).real)) > 0.1
     # whole cells without a transform: two cells along x, forward
-    field = TurbulentField(BOX, Turbulence(ct2=0.1, outer_scale=1.0, eddy_lifetime=None), Wind(speed=2.0))
+    field = TurbulentField(BOX, Turbulence(ct2=0.1, outer_scale=1.0, eddy_lifetime="frozen"), Wind(speed=2.0))
     np.testing.assert_allclose(field.at(2 * 0.0625 / 2), np.roll(field.at(0.0), 2, axis=2), atol=1e-12)
     np.testing.assert_allclose(field.at(2.0), field.at(0.0), atol=1e-12)  # frozen air comes back
 

@@ -139,7 +139,7 @@ def test_units_are_shown() -> None:
 
 
 def test_descriptions_are_words_not_markup() -> None:
-    texts = [Scene.load(name).to_toml(comments=True) for name in ("pyramid", "road")]
+    texts = [Scene.load(name).to_toml(comments=True) for name in ("pyramid", "road", "shimmer")]
     remarks = [line.split("  # ")[1] for text in texts for line in text.splitlines() if "  # " in line]
     assert len(remarks) > 100
     assert [remark for remark in remarks if any(mark in remark for mark in ("\\", ":math:", "``", "$"))] == []

@@ -233,20 +233,16 @@ def warn_of_errors(report: ErrorReport, scene: Scene) -> None:
         remedy = _remedy(scene)
     else:
         asked, remedy = _FIXED_STEP_ERROR, "shorten tracer.step, or leave it out for steps that adapt"
+    faults = []
     if report.worst > asked:
         wanted = "" if tracer.step is not None else f" where {asked:.2g} were asked for"
-        warnings.warn(
-            f"what is seen is displaced by up to {report.worst:.2g} pixels (mean {report.mean:.2g}){wanted}; "
-            f"{remedy}",
-            NigemizuWarning,
-            stacklevel=4,
+        faults.append(
+            f"what is seen is displaced by up to {report.worst:.2g} pixels (mean {report.mean:.2g}){wanted}"
         )
     if report.strays > _SEEN_SHARE:
-        warnings.warn(
-            f"{report.strays:.2%} of the rays meet something else than they ought to; {remedy}",
-            NigemizuWarning,
-            stacklevel=4,
-        )
+        faults.append(f"{report.strays:.2%} of the rays meet something else than they ought to")
+    if faults:
+        warnings.warn(f"{', and '.join(faults)}; {remedy}", NigemizuWarning, stacklevel=4)
 
 
 def _remedy(scene: Scene) -> str:

@@ -201,7 +201,7 @@ class TurbulentField:
 
     def _epoch(self, wave_number: float) -> float:
         """Length of an epoch [s] at a wave number."""
-        if self.settings.eddy_lifetime is None:
+        if self.settings.eddy_lifetime == "frozen":
             return math.inf
         length = self.settings.eddy_lifetime * (2 * math.pi / wave_number) ** (2 / 3) / MEMORY
         for speeds, step, cells in zip(

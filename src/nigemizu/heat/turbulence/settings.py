@@ -8,7 +8,7 @@ from typing import Annotated, Final, Literal, Self, final
 import numpy as np
 from pydantic import Field, model_validator
 
-from nigemizu.heat.measures import Kelvin, Metres, Seconds
+from nigemizu.heat.measures import Kelvin, Metres
 from nigemizu.values import Value
 
 __all__ = ["FREE_CONVECTION", "StructureTable", "Turbulence"]
@@ -87,10 +87,10 @@ class Turbulence(Value):
         Outer scale in units of the height above the ground; never above `outer_scale` where both are given.
     largest : float, m, optional
         Leave out, by a smooth filter, the eddies above this wavelength: because a computed flow makes them.
-    eddy_lifetime : float, s, optional
+    eddy_lifetime : float, s, or "frozen"
         Time after which an eddy of one metre is another one; larger and smaller eddies in proportion to
-        their wavelength^(2/3). None: frozen, and then the field comes back when the wind has blown through
-        the box.
+        their wavelength^(2/3). ``"frozen"``: for ever, and then the field comes back when the wind has
+        blown through the box.
     unresolved : {"left out", "folded"}
         What becomes of eddies that have no room between the cells. ``"left out"``: the grid has the eddies
         that it can hold, and integrals along rows of cells, which bend light, are right for cells of any
@@ -141,7 +141,7 @@ class Turbulence(Value):
     outer_scale: Metres | None = Field(default=None, gt=0)
     outer_scale_per_height: float | None = Field(default=None, gt=0)
     largest: Metres | None = Field(default=None, gt=0)
-    eddy_lifetime: Seconds | None = Field(default=1.4, gt=0)
+    eddy_lifetime: Annotated[float, Field(gt=0, json_schema_extra={"unit": "s"})] | Literal["frozen"] = 1.4
     unresolved: Literal["left out", "folded"] = "left out"
     seed: int = Field(default=0, ge=0)
     air_temperature: Kelvin = Field(default=293.15, gt=0)
