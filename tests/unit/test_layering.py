@@ -24,8 +24,9 @@ ROOMS: dict[str, set[str]] = {
     "trace": {"air", "field"},
     "render": {"air", "heat", "field", "trace"},
     "output": {"air", "heat", "field", "trace"},
+    "measure": {"air", "heat", "output"},
     "scene": {"air", "heat", "field", "trace", "render", "output"},
-    "cli": {"air", "heat", "field", "trace", "render", "output", "scene"},
+    "cli": {"air", "heat", "field", "trace", "render", "output", "scene", "measure"},
 }
 """What each room may import of the others: the chain, read from left to right."""
 
@@ -36,6 +37,7 @@ OUTSIDE: dict[str, set[str]] = {
     "trace": {"drjit", "numpy", "pydantic"},
     "render": {"PIL", "drjit", "mitsuba", "numpy", "pydantic", "xarray"},
     "output": {"OpenEXR", "PIL", "av", "matplotlib", "netCDF4", "numpy", "pydantic", "xarray", "zarr"},
+    "measure": {"PIL", "av", "netCDF4", "numpy", "pydantic", "scipy", "xarray"},
     "scene": {"drjit", "numpy", "pydantic", "xarray"},
     "cli": {"drjit", "numba", "numpy", "pydantic", "rich", "scipy", "xarray"},
 }

@@ -121,6 +121,20 @@ def _seconds(text: str) -> float:
     return value
 
 
+def _quantity(unit: str) -> Callable[[str], float]:
+    """Reads a number, with or without a unit."""
+
+    def read(text: str) -> float:
+        from nigemizu.units import UnitError, to_unit
+
+        try:
+            return to_unit(text, unit)
+        except UnitError as error:
+            raise argparse.ArgumentTypeError(f"{text!r} cannot be used; write {error}") from None
+
+    return read
+
+
 def _verb(name: str) -> Callable[[argparse.Namespace], int]:
     """The function for a verb, imported when it is called."""
 
@@ -146,6 +160,7 @@ def _parsers() -> tuple[_Parser, dict[str, argparse.ArgumentParser]]:
         "animate": ("the film", _animate),
         "simulate": ("the heated air alone, as a dataset", _simulate),
         "trace": ("bent rays as data or as the ray diagram", _trace),
+        "measure": ("turbulence from the shimmer in a film", _measure),
         "scenes": ("list the built-in scenes", _nothing),
         "show": ("print a scene as TOML that can be edited", _show),
         "check": ("validate scene files", _check),
@@ -283,6 +298,43 @@ def _trace(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--time", type=_time, metavar="SECONDS", help="instant of the air")
     _json(parser)
     parser.add_argument("-o", "--output", metavar="OUT", help="write .csv, .nc, .png or .svg")
+
+
+def _measure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("film", metavar="FILM", help=".mp4, .gif, .webp, .avi, .nc, or a folder of frames")
+    flags: tuple[tuple[str, Callable[[str], Any], str, str], ...] = (
+        ("distance", _quantity("m"), "METRES", "to what the film shows; 1km is understood"),
+        ("aperture", _quantity("m"), "METRES", "diameter of the lens, such as 50mm; 0 for a pinhole"),
+        ("pixel-angle", _quantity("rad"), "RAD", "angle that a pixel spans"),
+        ("focal-length", _quantity("m"), "METRES", "with --pixel-pitch in the place of --pixel-angle"),
+        ("pixel-pitch", _quantity("m"), "METRES", "distance of the pixels on the sensor, such as 5um"),
+        ("wavelength", _quantity("m"), "METRES", "of the light (550nm)"),
+        ("inner-scale", _quantity("m"), "METRES", "size of the smallest eddies (0; a pinhole needs it)"),
+        ("outer-scale", _quantity("m"), "METRES", "size of the largest eddies (no limit)"),
+        ("cn2", float, "M^(-2/3)", "strength of the turbulence, to set the film against"),
+        ("fps", float, "N", "frames per second, where the film does not say it or says it wrong"),
+        ("tile", _positive, "PIXELS", "side of the tiles that are followed (16 to 64)"),
+        ("search", _positive, "PIXELS", "how far they may move (12, or half a tile)"),
+    )
+    for name, kind, metavar, words in flags:
+        parser.add_argument(f"--{name}", type=kind, metavar=metavar, help=words)
+    parser.add_argument(
+        "--wave", choices=("spherical", "plane"), help="light of a point at DISTANCE, or of a star"
+    )
+    parser.add_argument("--remove-shake", action="store_true", help="take out what moves all of the picture")
+    parser.add_argument(
+        "--points", action="store_true", help="take tiles for points, as the closed forms of textbooks do"
+    )
+    _json(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        action="append",
+        default=[],
+        help="write each tile (.csv, .nc) or a figure (.png, .svg); may be repeated",
+    )
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress bars")
 
 
 def _flags(parser: argparse.ArgumentParser) -> list[str]:

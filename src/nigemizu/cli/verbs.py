@@ -17,7 +17,19 @@ from nigemizu.errors import InputError
 if TYPE_CHECKING:
     from nigemizu.scene import Scene
 
-__all__ = ["animate", "bench", "check", "doctor", "render", "scenes", "schema", "show", "simulate", "trace"]
+__all__ = [
+    "animate",
+    "bench",
+    "check",
+    "doctor",
+    "measure",
+    "render",
+    "scenes",
+    "schema",
+    "show",
+    "simulate",
+    "trace",
+]
 
 # Flags that replace one value of the scene: attribute of the options → key of the scene.
 _FLAG_KEYS = {
@@ -126,6 +138,35 @@ def trace(options: argparse.Namespace) -> int:
             print(written, file=sys.stderr if options.json else sys.stdout)
     if options.json:
         print(json.dumps(rays.as_records(), indent=1, allow_nan=False))
+    return 0
+
+
+def measure(options: argparse.Namespace) -> int:
+    """``nigemizu measure``."""
+    from nigemizu.measure import measure_film
+    from nigemizu.measure.saving import SUFFIXES, save
+    from nigemizu.output import ready_to_write
+
+    for output in options.output:
+        ready_to_write(output, SUFFIXES)
+    if options.fps is not None and not options.fps > 0:
+        raise InputError("impossible frame rate", key="--fps", value=options.fps, expected="above 0")
+    optics = ("distance", "aperture", "pixel_angle", "focal_length", "pixel_pitch", "wavelength", "wave")
+    more = ("inner_scale", "outer_scale", "cn2", "tile", "search", "remove_shake", "points")
+    with meter(quiet=options.quiet) as progress:
+        measured = measure_film(
+            options.film,
+            interval=None if options.fps is None else 1.0 / options.fps,
+            progress=progress,
+            **{name: getattr(options, name) for name in (*optics, *more)},
+        )
+        written = [save(measured, output, command=options.command) for output in options.output]
+    if options.json:
+        print(json.dumps(measured.as_dict(), indent=1, allow_nan=False, ensure_ascii=False))
+    else:
+        print(measured.table())
+    for path in written:
+        print(path, file=sys.stderr)
     return 0
 
 
