@@ -190,7 +190,7 @@ def _draw_spectrum(axes: Axes, shown: ShimmerFigure) -> None:
         power = 1e12 * shown.power[positive]
         axes.loglog(shown.frequency[positive], power, color=_INK, lw=1.4)
         axes.set_ylim(float(power.min()) / 3, 3 * float(power.max()))
-        if shown.white > 1e-6 * float(shown.power.max()):
+        if 3e12 * shown.white > float(power.min()):
             axes.axhline(1e12 * shown.white, color=_ACROSS, lw=1.0, ls=(0, (5, 2)), label="noise, taken off")
             axes.legend(frameon=False, fontsize=8.5)
     axes.set_xlabel("frequency (Hz)" if shown.unit == "s" else "frequency (cycles per frame)")

@@ -94,7 +94,7 @@ class TurbulentField:
 
     Notes
     -----
-    T'(x, y, z_i, t) = Σ_q e^{i q·x} s_i(q) Σ_e w_e(t) e^{−i q·U_i (t − t_e)} Σ_j L_ij(|q|) g_j(q, e): waves q
+    T'(x, y, z_i, t) = Σ_q e^{i q·x} s_i(q) Σ_e w_e(t) e^{−i q·U_i (t − t_e)} Σ_j L_ij(q) g_j(q, e): waves q
     of the box; their amplitude s_i with the spectrum of `Turbulence`; the factor L of the vertical coherence
     (`nigemizu.heat.turbulence.levels`), so that differences between any two levels are those of real air;
     independent normal numbers g, drawn afresh for every epoch e; and the shift by the wind since the middle
