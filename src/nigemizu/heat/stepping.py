@@ -21,7 +21,7 @@ from nigemizu.heat.quantity import Quantity
 from nigemizu.heat.transport import Diffusivity, Wind
 from nigemizu.heat.vertical import BOUNDARY_ROWS, VerticalDiffusion
 
-__all__ = ["GroundCourse", "State", "Stepper", "ground_quantity"]
+__all__ = ["GroundCourse", "State", "Stepper", "ground_quantity", "processors", "top_temperature"]
 
 
 @final
@@ -87,11 +87,11 @@ class Stepper:
         self.now = np.empty((self.levels + BOUNDARY_ROWS, math.prod(grid.shape[1:])))
         self.next = np.empty_like(self.now)
         self.now[: self.levels] = initial.reshape(self.levels, -1)
-        held = _top_temperature(grid, initial) if top.temperature is None else top.temperature
+        held = top_temperature(grid, initial) if top.temperature is None else top.temperature
         self.now[-1] = self.next[-1] = held
         self.motions: dict[float, HorizontalMotion] = {}
         self.y_first = False
-        self.workers = _processors()
+        self.workers = processors()
         column = VerticalDiffusion.build(grid, diffusivity, ground, top)
         self.columns = ColumnSteps(grid, column, ground, self.workers)
         self.pool: ThreadPoolExecutor | None = None
@@ -164,7 +164,8 @@ class Stepper:
         return State(time, temperature, skin.reshape(self.grid.shape[1:]))
 
 
-def _processors() -> int:
+def processors() -> int:
+    """Processors that this process may use."""
     # what this process may use, where the system tells
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
@@ -174,7 +175,7 @@ def _rounded(step: float) -> float:
     return float(f"{step:.14g}")
 
 
-def _top_temperature(grid: Grid, initial: np.ndarray) -> float:
+def top_temperature(grid: Grid, initial: np.ndarray) -> float:
     """Mean temperature at the top of the box, on the line through the two highest levels."""
     highest = float(np.mean(initial[-1]))
     if grid.shape[0] == 1:

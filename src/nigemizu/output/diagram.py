@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nigemizu.errors import InputError
+from nigemizu.output.figures import figure_file, figure_metadata
 from nigemizu.output.files import write_bytes
 from nigemizu.output.provenance import Provenance
 from nigemizu.output.side_view import DiagramRay, Outline, Profile
@@ -82,12 +83,7 @@ def ray_diagram(
     MachineError
         The disk is full.
     """
-    target = Path(path)
-    kind = target.suffix.lower()
-    if kind not in (".svg", ".png", ".pdf"):
-        raise InputError(
-            "unknown kind of diagram", file=str(target), value=kind, expected=".svg, .png or .pdf"
-        )
+    target, kind = figure_file(path)
     if not rays:
         raise InputError("there are no rays to draw", key="rays")
     from matplotlib import rc_context
@@ -112,7 +108,9 @@ def ray_diagram(
         if vanishing is not None:
             _name_ground(main, np.asarray(vanishing[0]), place[0], upper)
         buffer = io.BytesIO()
-        figure.savefig(buffer, format=kind[1:], dpi=160, metadata=_metadata(kind, provenance or Provenance()))
+        figure.savefig(
+            buffer, format=kind[1:], dpi=160, metadata=figure_metadata(kind, provenance or Provenance())
+        )
     return write_bytes(target, buffer.getvalue())
 
 
@@ -310,13 +308,3 @@ def _halo() -> list[Any]:
 
 def _two_digits(number: float) -> str:
     return f"{float(f'{number:.2g}'):g}"
-
-
-def _metadata(kind: str, provenance: Provenance) -> dict[str, Any]:
-    fields = provenance.fields()
-    if kind == ".png":
-        return dict(fields)
-    about = "\n".join(text for name, text in fields.items() if name != "Software")
-    if kind == ".svg":
-        return {"Creator": provenance.software, "Date": None, "Description": about}
-    return {"Creator": provenance.software, "CreationDate": None, "Subject": about}

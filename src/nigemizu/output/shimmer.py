@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
-from nigemizu.errors import InputError
+from nigemizu.output.figures import figure_file, figure_metadata
 from nigemizu.output.files import write_bytes
 from nigemizu.output.provenance import Provenance
 
@@ -95,16 +95,9 @@ def shimmer_figure(path: str | Path, shown: ShimmerFigure, *, provenance: Proven
     MachineError
         The disk is full.
     """
-    target = Path(path)
-    kind = target.suffix.lower()
-    if kind not in (".svg", ".png", ".pdf"):
-        raise InputError(
-            "unknown kind of diagram", file=str(target), value=kind, expected=".svg, .png or .pdf"
-        )
+    target, kind = figure_file(path)
     from matplotlib import rc_context
     from matplotlib.figure import Figure
-
-    from nigemizu.output.diagram import _metadata
 
     style: Any = {"font.size": 9.5, "axes.edgecolor": _INK, "axes.linewidth": 0.8, "text.color": _INK}
     # A fixed salt and no dates: equal films give equal files.
@@ -118,7 +111,9 @@ def shimmer_figure(path: str | Path, shown: ShimmerFigure, *, provenance: Proven
         if shown.title:
             figure.suptitle(shown.title, fontsize=12.5, weight="bold", x=0.012, ha="left")
         buffer = io.BytesIO()
-        figure.savefig(buffer, format=kind[1:], dpi=160, metadata=_metadata(kind, provenance or Provenance()))
+        figure.savefig(
+            buffer, format=kind[1:], dpi=160, metadata=figure_metadata(kind, provenance or Provenance())
+        )
     return write_bytes(target, buffer.getvalue())
 
 

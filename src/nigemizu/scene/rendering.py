@@ -126,7 +126,8 @@ class Studio:
         from nigemizu.render.truth import ground_truth
         from nigemizu.scene.truth import PictureTruth
 
-        self._set_air(air if air is None or isinstance(air, AirVolume) else air[len(air) // 2])
+        if air is not None and not isinstance(air, AirVolume):  # otherwise it is in place still
+            self._set_air(air[len(air) // 2])
         # Through the middle of the aperture, where there is one.
         layers = ground_truth(self._integrator.bending, self._built, pinhole_sensor(self._scene.camera))
         if self._without_air is None:

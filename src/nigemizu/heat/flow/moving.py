@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final, final
@@ -18,6 +17,7 @@ from nigemizu.heat.flow.padding import PAD, pad_ends, pad_sides, padded
 from nigemizu.heat.flow.pressure import Poisson
 from nigemizu.heat.flow.settings import Convection
 from nigemizu.heat.grid import Grid
+from nigemizu.heat.stepping import processors, top_temperature
 
 __all__ = ["MovingAir"]
 
@@ -86,9 +86,7 @@ class MovingAir:
         held_sides: dict[str, tuple[float, float]] | None = None,
     ) -> None:
         self.grid, self.flow, self.diffusivity = grid, flow, diffusivity
-        self.workers = (
-            len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        )
+        self.workers = processors()
         self._pool: ThreadPoolExecutor | None = None
         self.walls = (sides.x == "insulated", sides.y == "insulated")
         self._held = held_sides or {}
@@ -211,7 +209,8 @@ class MovingAir:
         for field, mean in zip((self.u, self.v), mean_wind, strict=True):
             if mean is not None:
                 field[INSIDE] += mean - self._mean(field)
-        self._fill()
+        if mean_wind != (None, None):
+            self._fill()
         self.time = begin + step
 
     def _add(self, b: float) -> None:
@@ -287,11 +286,7 @@ class MovingAir:
         edge = float(self.grid.z_edges[-1])
         if self._top.temperature is not None:
             return self._top.temperature + self.flow.lapse_rate * edge
-        means = self.warmth[INSIDE].mean(axis=(1, 2))
-        if len(means) == 1:
-            return float(means[0])
-        z = self.grid.z
-        return float(means[-1] + (means[-1] - means[-2]) / (z[-1] - z[-2]) * (edge - z[-1]))
+        return top_temperature(self.grid, self.warmth[INSIDE])
 
     def _fill(self) -> None:
         """The padding of all fields."""
