@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from nigemizu.heat.flow.checkpoint import Checkpoints
     from nigemizu.heat.flow.running import convect
     from nigemizu.heat.flow.settings import Convection
+    from nigemizu.heat.flow.sources import Source
     from nigemizu.heat.grid import Grid, GridSpec, require_memory
     from nigemizu.heat.initial import Initial, ProfileTable, Unevenness
     from nigemizu.heat.quantity import (
@@ -61,6 +62,7 @@ __all__ = [
     "Rectangle",
     "Schedule",
     "Sides",
+    "Source",
     "State",
     "Stripes",
     "StructureTable",
@@ -86,6 +88,7 @@ _HOMES: Final = {
     "flow.checkpoint": ("Checkpoints",),
     "flow.running": ("convect",),
     "flow.settings": ("Convection",),
+    "flow.sources": ("Source",),
     "solver": ("State", "evolve", "solve"),
     "grid": ("Grid", "GridSpec", "require_memory"),
     "initial": ("Initial", "ProfileTable", "Unevenness"),

@@ -12,8 +12,10 @@ __all__ = [
     "KelvinDifference",
     "Metres",
     "MetresPerSecond",
+    "Newtons",
     "Seconds",
     "SquareMetresPerSecond",
+    "Watts",
 ]
 
 Metres = Annotated[float, Field(json_schema_extra={"unit": "m"})]
@@ -23,3 +25,5 @@ KelvinDifference = Annotated[float, Field(json_schema_extra={"unit": "K differen
 MetresPerSecond = Annotated[float, Field(json_schema_extra={"unit": "m/s"})]
 SquareMetresPerSecond = Annotated[float, Field(json_schema_extra={"unit": "m2/s"})]
 Degrees = Annotated[float, Field(json_schema_extra={"unit": "degree"})]
+Watts = Annotated[float, Field(json_schema_extra={"unit": "W"})]
+Newtons = Annotated[float, Field(json_schema_extra={"unit": "N"})]

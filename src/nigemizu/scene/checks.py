@@ -29,6 +29,13 @@ def check(scene: Scene, available: Callable[[], int | None]) -> None:
     _check_extent(scene)
     if scene.process == "convection":
         _check_flow(scene)
+    elif scene.sources:
+        raise InputError(
+            "only air that moves by itself carries away what sources release",
+            key="process",
+            value=scene.process,
+            expected="convection, with [[sources]]",
+        )
 
 
 def _check_flow(scene: Scene) -> None:
@@ -43,6 +50,7 @@ def _check_flow(scene: Scene) -> None:
         scene.initial.sample(grid).mean(axis=(1, 2)),
         scene.diffusivity.molecular,
         max(scene.time.duration, max(scene.film.times)),
+        scene.sources,
     )
 
 
@@ -109,7 +117,7 @@ def _check_extent(scene: Scene) -> None:
             continue
         warnings.warn(
             f"objects.{position} ({entry.kind}) stands outside the grid, where light goes straight; "
-            "enlarge grid.x and grid.y, or set tracer.beyond = 'extend'",
+            "enlarge grid.x and grid.y, or set tracer.beyond = 'extend' or 'mean'",
             NigemizuWarning,
             stacklevel=4,
         )

@@ -13,6 +13,7 @@ from nigemizu.air import Atmosphere
 from nigemizu.errors import InputError
 from nigemizu.heat.boundary import GroundBoundary, Sides, Top
 from nigemizu.heat.flow.settings import Convection
+from nigemizu.heat.flow.sources import Source
 from nigemizu.heat.grid import GridSpec
 from nigemizu.heat.initial import Initial
 from nigemizu.heat.transport import Diffusivity, Wind
@@ -63,6 +64,8 @@ class Scene(Value):
         Whether heat spreads in air that the wind alone moves, or hot air rises, breaks up and mixes.
     convection : Convection
         How it does so.
+    sources : tuple of Source
+        What is heated or pushed inside air that moves by itself.
     turbulence : Turbulence, optional
         Fluctuations that no grid computes, added where light passes.
     time, film, tracer : TimeSpec, FilmSpec, Tracer
@@ -93,6 +96,7 @@ class Scene(Value):
     wind: Wind = Wind()
     process: Literal["diffusion", "convection"] = "diffusion"
     convection: Convection = Convection()
+    sources: tuple[Source, ...] = ()
     turbulence: Turbulence | None = None
     time: TimeSpec = TimeSpec()
     film: FilmSpec = FilmSpec()

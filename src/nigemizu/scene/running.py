@@ -40,7 +40,9 @@ AirSource: TypeAlias = "xarray.Dataset | AirVolume | str | os.PathLike[str] | No
 Variant: TypeAlias = Literal["auto", "llvm", "cuda"]
 FloatArray: TypeAlias = NDArray[np.float64]
 
-_PHYSICS: Final = {"grid", "initial", "ground", "sides", "top", "diffusivity", "wind", "convection"}
+_PHYSICS: Final = {
+    "grid", "initial", "ground", "sides", "top", "diffusivity", "wind", "convection", "sources",
+}  # fmt: skip
 
 
 class AirVolume(NamedTuple):
@@ -192,9 +194,8 @@ def _states(
         "progress": progress,
     }
     if scene.process == "convection":
-        return convect(
-            grid, temperature, convection=scene.convection, checkpoints=kept, first=first, **common
-        )
+        common |= {"convection": scene.convection, "sources": scene.sources}
+        return convect(grid, temperature, checkpoints=kept, first=first, **common)
     return itertools.islice(evolve(grid, temperature, **common), first, None)
 
 

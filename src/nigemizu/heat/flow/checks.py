@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from nigemizu.errors import InputError, NigemizuWarning
 from nigemizu.heat.boundary import ExchangeGround, FluxGround, GroundBoundary, HeldGround
 from nigemizu.heat.flow.ground import FREE
 from nigemizu.heat.flow.settings import Convection
+from nigemizu.heat.flow.sources import SPECIFIC_HEAT, Source, air_density, require_inside
 from nigemizu.heat.grid import Grid
 from nigemizu.heat.transport import Wind
 
@@ -34,6 +36,7 @@ def require_resolved(
     temperature: np.ndarray,
     diffusivity: float,
     duration: float,
+    sources: Sequence[Source] = (),
 ) -> None:
     r"""Refuse, or warn of, a flow that its mesh cannot hold.
 
@@ -46,12 +49,13 @@ def require_resolved(
     diffusivity : float, m2 s-1
         Molecular, of heat.
     duration : float, s
+    sources : sequence of Source
 
     Raises
     ------
     InputError
-        For two or three cells across, a box that is narrower than high, and cells too coarse for a flow
-        without a closure.
+        For two or three cells across, a box that is narrower than high, cells too coarse for a flow without a
+        closure, and sources that the mesh cannot hold.
 
     Warns
     -----
@@ -63,21 +67,26 @@ def require_resolved(
     -----
     The speed of free fall :math:`U = \sqrt{g H \Delta T/T}`, or :math:`(g H F/T)^{1/3}` over a given flux F
     of temperature, and that of the wind, give the cell Reynolds number U Δ/ν and the length of the steps.
+    So do sources of the width L: :math:`\sqrt{F/(\rho L^2)}` and :math:`(g P/(\rho c_p T L))^{1/3}`. Their
+    plumes are a quarter as wide as they are high: without warm ground the width of the box is not looked at.
     """
+    require_inside(grid, sources)
     _, ny, nx = grid.shape
     height = float(grid.z_edges[-1] - grid.z_edges[0])
     widths = {"x": (nx, grid.horizontal_step("x")), "y": (ny, grid.horizontal_step("y"))}
-    for axis, (count, width) in widths.items():
-        _require_room(axis, count, count * width, height)
     mean = float(np.mean(temperature))
     excess = _excess(ground, temperature)
+    fills = not sources or excess > 0 or isinstance(ground, FluxGround)
+    for axis, (count, width) in widths.items():
+        _require_room(axis, count, count * width, height if fills else 0.0)
     lift = convection.gravity / mean
     if isinstance(ground, FluxGround):
         flux = max(ground.heat_flux.bounds()[1], 0.0) / ground.heat_capacity
         fall = (lift * height * flux) ** (1 / 3)
     else:
         fall = math.sqrt(lift * height * max(excess, 0.0))
-    blowing = float(np.max(np.hypot(*wind.velocity(grid.z))))
+    released = max((_speed(source, mean, lift) for source in sources), default=0.0)
+    blowing = max(float(np.max(np.hypot(*wind.velocity(grid.z)))), released)
     speed = fall + blowing
     coarse = max(width for count, width in widths.values() if count > 1 or count == max(nx, ny))
     if convection.closure == "none":
@@ -118,6 +127,13 @@ def _excess(ground: GroundBoundary, temperature: np.ndarray) -> float:
     if isinstance(ground, HeldGround | ExchangeGround):
         return float(ground.temperature.bounds()[1] - np.min(temperature))
     return 0.0
+
+
+def _speed(source: Source, temperature: float, lift: float) -> float:
+    """Of the air in a source, about [m/s]."""
+    rho, width = air_density(temperature), math.prod(source.size) ** (1 / 3)
+    rising = lift * abs(source.power) / (rho * SPECIFIC_HEAT * width)
+    return math.sqrt(source.thrust / rho) / width + math.cbrt(rising)
 
 
 def _require_laminar(speed: float, cell: float, viscosity: float) -> None:

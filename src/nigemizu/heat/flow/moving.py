@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final, final
 
@@ -16,6 +16,7 @@ from nigemizu.heat.flow.ground import GroundLayer
 from nigemizu.heat.flow.padding import PAD, pad_ends, pad_sides, padded
 from nigemizu.heat.flow.pressure import Poisson
 from nigemizu.heat.flow.settings import Convection
+from nigemizu.heat.flow.sources import Release, Source
 from nigemizu.heat.grid import Grid
 from nigemizu.heat.stepping import processors, top_temperature
 
@@ -46,6 +47,8 @@ class MovingAir:
         Molecular, of heat.
     held_sides : mapping, optional
         Temperatures [K] of the two walls along "x" or "y", which are insulated otherwise.
+    sources : sequence of Source
+        What is heated or pushed inside.
 
     Attributes
     ----------
@@ -84,6 +87,7 @@ class MovingAir:
         top: Top,
         diffusivity: float,
         held_sides: dict[str, tuple[float, float]] | None = None,
+        sources: Sequence[Source] = (),
     ) -> None:
         self.grid, self.flow, self.diffusivity = grid, flow, diffusivity
         self.workers = processors()
@@ -95,6 +99,7 @@ class MovingAir:
         self._nu = np.full(self.u.shape, flow.viscosity)
         self._poisson = Poisson(grid, self.walls, self._share, self.workers)
         self._layer = GroundLayer(grid, ground, flow, diffusivity)
+        self._release = Release(grid, sources, self.walls)
         self._top = top
         self.top_warmth = math.nan
         self.zero = math.nan
@@ -121,7 +126,7 @@ class MovingAir:
         """Begin with a temperature (nz, ny, nx) [K] and velocities on the faces, each (nz, ny, nx) [m/s]."""
         self.time = time
         self.warmth[INSIDE] = temperature + (self.flow.lapse_rate * self.grid.z)[:, None, None]
-        self.zero = float(np.mean(self.warmth[INSIDE]))
+        self._set_zero(float(np.mean(self.warmth[INSIDE])))
         for field, given in zip((self.u, self.v, self.w), () if velocity is None else velocity, strict=False):
             field[INSIDE] = given
         if math.isnan(self.top_warmth):
@@ -136,8 +141,13 @@ class MovingAir:
         self.warmth[INSIDE] = warmth
         for field, given in zip((self.u, self.v, self.w), velocity, strict=True):
             field[INSIDE] = given
-        self.time, self.zero, self.top_warmth = time, zero, top_warmth
+        self.time, self.top_warmth = time, top_warmth
+        self._set_zero(zero)
         self._fill()
+
+    def _set_zero(self, warmth: float) -> None:
+        self.zero = warmth
+        self._release.set_air(warmth, self.flow.gravity / warmth)
 
     @property
     def temperature(self) -> np.ndarray:
@@ -188,7 +198,22 @@ class MovingAir:
         if flow.viscosity == 0:
             room = 4 * (self._rdx**2 + self._rdy**2 + np.max(self._rdz) ** 2)
             spreading = max(spreading, self.diffusivity * room)
-        rate = crossing / flow.courant + spreading / _SPREADING + lifting / _LIFTING
+        now = self._bearable(crossing, spreading, lifting, self.time)
+        then = self._bearable(crossing, spreading, lifting, self.time + now)
+        # up to where the next source starts, unless that is nearer than a step that bears it
+        return min(now, max(then, self._release.next_start(self.time) - self.time))
+
+    def first_step(self) -> float:
+        """The step [s] that sources bear in air at rest, once they are on; infinite without any."""
+        return self._bearable(0.0, 0.0, 0.0, math.inf)
+
+    def _bearable(self, crossing: float, spreading: float, lifting: float, before: float) -> float:
+        """The step for these rates [1/s], with sources that start before an instant [s]."""
+        pushing, heating = self._release.rates(before)
+        courant = self.flow.courant
+        # crossing·Δt + pushing·Δt² makes the Courant number; (lifting·Δt)³ + heating·Δt³ the turn
+        rate = 0.5 * (crossing + math.sqrt(crossing**2 + 4 * courant * pushing)) / courant
+        rate += spreading / _SPREADING + math.cbrt(lifting**3 + heating) / _LIFTING
         return math.inf if rate == 0 else float(1 / rate)
 
     def advance(self, step: float, mean_wind: tuple[float | None, float | None] = (None, None)) -> None:
@@ -200,6 +225,7 @@ class MovingAir:
         begin = self.time
         for a, b, c in zip(_A, _B, _C, strict=True):
             self._push(a, step, begin + c * step)
+            self._release.add(self._increments, begin, step)
             if self.flow.closure == "none":
                 self._add(b)
             else:

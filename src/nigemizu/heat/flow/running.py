@@ -14,6 +14,7 @@ from nigemizu.heat.boundary import GroundBoundary, Sides, Top
 from nigemizu.heat.flow.checkpoint import Checkpoints
 from nigemizu.heat.flow.moving import MovingAir
 from nigemizu.heat.flow.settings import VOLUMES, Convection
+from nigemizu.heat.flow.sources import Source
 from nigemizu.heat.grid import Grid, require_memory
 from nigemizu.heat.solver import check_temperature, check_times
 from nigemizu.heat.stepping import State
@@ -43,6 +44,7 @@ def convect(
     top: Top | None = None,
     diffusivity: Diffusivity | None = None,
     wind: Wind | None = None,
+    sources: Sequence[Source] = (),
     time_step: float | None = None,
     checkpoints: Checkpoints | None = None,
     first: int = 0,
@@ -66,6 +68,8 @@ def convect(
         Its molecular part; eddies are the flow's own.
     wind : Wind
         At the beginning; its mean over the height is kept up.
+    sources : sequence of Source
+        What is heated or pushed inside the air.
     time_step : float, s, optional
         Longest step; shorter ones follow from the flow.
     checkpoints : Checkpoints, optional
@@ -102,7 +106,7 @@ def convect(
     instants = check_times(times, 0.0)
     require_memory(math.prod(grid.shape), available=available, volumes=VOLUMES)
     initial = check_temperature(grid, temperature)
-    air = MovingAir(grid, convection, ground, sides, top, diffusivity.molecular)
+    air = MovingAir(grid, convection, ground, sides, top, diffusivity.molecular, sources=sources)
     mean_wind = _mean_wind(grid, wind, air.walls)
     with air:
         if checkpoints is None or not checkpoints.take_up(air, instants[first]):
@@ -148,7 +152,7 @@ def _steps_to(run: _Run, instant: float) -> Iterator[None]:
     first = 0.0
     while air.time < instant * (1 - 1e-12):
         bearable = air.longest_step()
-        first = first or min(bearable, instant)
+        first = first or min(bearable, instant, air.first_step())
         if not bearable > _SLOWEST * min(first, run.longest) or math.isnan(bearable):
             raise _diverged(run)
         left = instant - air.time
