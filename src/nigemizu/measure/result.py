@@ -258,7 +258,8 @@ class Measurement:
         scales = "" if o.inner_scale == 0 else f", inner scale {1e3 * o.inner_scale:.3g} mm"
         scales += "" if o.outer_scale is None else f", outer scale {o.outer_scale:.3g} m"
         scales += "" if o.largest is None else f", no eddies above {o.largest:.3g} m"
-        sources = sorted({words for words in o.origin.values() if words != "typed"})
+        prefix = "the scene's "
+        sources = sorted({words.removeprefix(prefix) for words in o.origin.values() if words != "typed"})
         shake = "taken out" if self.shake_removed else "left in (--remove-shake takes it out)"
         x, y = self.common
         return [
@@ -266,7 +267,7 @@ class Measurement:
             f"tiles of {self.tile} pixels: {', '.join(shown)}",
             f"path {o.distance:.5g} m, {lens}, {1e6 * o.pixel_angle:.4g} µrad per pixel, "
             f"{1e9 * o.wavelength:.4g} nm, {o.wave} wave{scales}"
-            + (f" (from {', '.join(sources)})" if sources else ""),
+            + (f" (of {prefix}{', '.join(sources)})" if sources else ""),
             f"independent frames {self.independent:.0f}; noise {100 * self.noise_share:.2g} % of the "
             "variance, taken off",
             f"motion common to all tiles: {x:.3g} pixels in x, {y:.3g} in y (rms), {shake}",
@@ -278,7 +279,7 @@ class Measurement:
 
 def _rows(quantities: tuple[Quantity, ...]) -> list[str]:
     with_theory = any(one.theory is not None for one in quantities)
-    head = ["", "unit", "measured", "95 % interval"]
+    head = ["quantity", "unit", "measured", "95 % interval"]
     head += ["theory", "ratio", ""] if with_theory else []
     lines = [head]
     for one in quantities:

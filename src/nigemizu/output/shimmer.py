@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, final
@@ -25,6 +26,7 @@ FloatArray: TypeAlias = NDArray[np.float64]
 _INK: Final = "#22303a"
 _ALONG: Final = "#c8442b"
 _ACROSS: Final = "#2a6f97"
+_WIDE: Final = 2.5  # width over height of a picture beside which a bar would be taller
 
 
 @final
@@ -130,7 +132,15 @@ def _draw_tiles(figure: Figure, axes: Axes, shown: ShimmerFigure) -> None:
     if seen.any() and float(np.ptp(shown.rms[seen])) < 1e-3 * float(np.max(shown.rms[seen])):
         tiles.set_clim(0.0, 1.2 * float(np.max(shown.rms[seen])))
     axes.add_collection(tiles)
-    figure.colorbar(tiles, ax=axes, shrink=0.85, label="angle of arrival, rms (µrad)")
+    height, width = shown.picture.shape
+    below = width > _WIDE * height
+    figure.colorbar(
+        tiles,
+        ax=axes,
+        shrink=0.85,
+        location="bottom" if below else "right",
+        label="angle of arrival, rms (µrad)",
+    )
     axes.set_xlabel("column (pixels)")
     axes.set_ylabel("row (pixels)")
 
@@ -141,17 +151,12 @@ def _draw_differences(axes: Axes, shown: ShimmerFigure) -> None:
         (shown.along, shown.along_theory, _ALONG, "o", "along the line of two tiles"),
         (shown.across, shown.across_theory, _ACROSS, "s", "across it"),
     )
-    for measured, theory, colour, marker, words in rows:
+    for measured, _, colour, marker, words in rows:
         axes.plot(angle, square * measured, marker, color=colour, ms=5, label=words)
+    for _, theory, colour, _, _ in rows:
         if theory is not None:
-            axes.plot(
-                angle,
-                square * theory,
-                color=colour,
-                lw=1.3,
-                alpha=0.8,
-                label="theory" if colour == _ALONG else None,
-            )
+            name = "theory" if colour == _ALONG else None
+            axes.plot(angle, square * theory, color=colour, lw=1.3, alpha=0.8, label=name)
     axes.set_xlabel("separation (µrad)")
     axes.set_ylabel("mean squared difference (µrad²)")
     axes.set_ylim(bottom=0.0)
@@ -175,16 +180,24 @@ def _draw_correlation(axes: Axes, shown: ShimmerFigure) -> None:
     axes.set_xlabel(f"lag ({shown.unit})")
     axes.set_ylabel("autocorrelation")
     axes.set_ylim(-0.6, 1.1)
+    axes.set_yticks((-0.5, 0.0, 0.5, 1.0))
     axes.set_xlim(left=0.0)
     _open_corner(axes)
 
 
 def _draw_spectrum(axes: Axes, shown: ShimmerFigure) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     positive = shown.power > 0
     if positive.any():
         power = 1e12 * shown.power[positive]
         axes.loglog(shown.frequency[positive], power, color=_INK, lw=1.4)
-        axes.set_ylim(float(power.min()) / 3, 3 * float(power.max()))
+        # whole decades, so that the axis has numbers
+        low, high = math.log10(power.min() / 1.2), math.log10(1.2 * power.max())
+        axes.set_ylim(10.0 ** math.floor(low), 10.0 ** math.ceil(high))
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         if 3e12 * shown.white > float(power.min()):
             axes.axhline(1e12 * shown.white, color=_ACROSS, lw=1.0, ls=(0, (5, 2)), label="noise, taken off")
             axes.legend(frameon=False, fontsize=8.5)
