@@ -17,7 +17,8 @@ Run = Callable[..., Any]
 def test_truth_goes_beside_the_picture(run: Run, small: tuple[str, ...]) -> None:
     done = run("render", "pyramid", "-o", "out.png", "--truth", *small)
     assert done.code == 0, done.err
-    assert {entry.name for entry in Path().iterdir()} == {"out.png", "out_truth.exr", "out_truth.nc"}
+    names = {"out.png", "out_truth.exr", "out_truth.nc", "out_truth.png"}
+    assert {entry.name for entry in Path().iterdir()} == names
     layers = read_layers("out_truth.exr")
     with xr.open_dataset("out_truth.nc") as truth:
         assert truth.sizes == {"row": 18, "column": 32, "colour": 3}

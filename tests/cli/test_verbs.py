@@ -191,7 +191,13 @@ def test_trace_writes_tables_and_diagrams(run: Run, small: tuple[str, ...]) -> N
 
 def test_scenes_lists_the_built_in_ones(run: Run) -> None:
     done = run("scenes")
-    assert [line.split()[0] for line in done.out.splitlines()] == ["pyramid", "road", "shimmer"]
+    assert [line.split()[0] for line in done.out.splitlines()] == [
+        "plume",
+        "pyramid",
+        "road",
+        "runway",
+        "shimmer",
+    ]
 
 
 def test_show_prints_toml_that_renders_the_same_scene(run: Run) -> None:

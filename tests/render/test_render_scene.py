@@ -173,6 +173,7 @@ def test_all_objects_are_seen():
         "sphere": render.Sphere(position=(300, 0, 3), radius=3, material=dark),
         "hills": render.Hills(distance=5000, height=150, spread=5, colour=(0, 0, 0)),
         "vehicle": render.Vehicle(position=(120, 0, 0)),
+        "aircraft": render.Aircraft(position=(600, 0, 0), colour=(0.3, 0.3, 0.3)),
         "mitsuba": render.MitsubaFile(
             fragment={
                 "type": "cube",

@@ -14,7 +14,7 @@ from nigemizu.scene import Scene, builtin_scenes
 from nigemizu.scene.times import TimeSpec
 from nigemizu.values import Value, field_unit
 
-NAMES = ("pyramid", "road", "shimmer")
+NAMES = ("plume", "pyramid", "road", "runway", "shimmer")
 
 
 def _values(annotation: Any, found: set[type[Value]]) -> set[type[Value]]:

@@ -14,9 +14,12 @@ from nigemizu.units import accepted_units
 from nigemizu.values import Value, field_unit
 
 COLOURS = {
+    "Aircraft.colour",
+    "Aircraft.fin_colour",
     "Asphalt.colour",
     "Checker.colours",
     "Colour.colour",
+    "Dots.colours",
     "Hills.colour",
     "Light.horizon_colour",
     "Light.zenith_colour",
@@ -34,6 +37,7 @@ SHARES = {
     "Convection.courant",
     "Convection.turbulent_prandtl",
     "Diffusivity.horizontal_factor",
+    "Dots.density",
     "Light.ground_albedo",
     "Light.sky_scale",
     "Light.sun_scale",
@@ -139,7 +143,9 @@ def test_units_are_shown() -> None:
 
 
 def test_descriptions_are_words_not_markup() -> None:
-    texts = [Scene.load(name).to_toml(comments=True) for name in ("pyramid", "road", "shimmer")]
+    texts = [
+        Scene.load(name).to_toml(comments=True) for name in ("plume", "pyramid", "road", "runway", "shimmer")
+    ]
     remarks = [line.split("  # ")[1] for text in texts for line in text.splitlines() if "  # " in line]
     assert len(remarks) > 100
     assert [remark for remark in remarks if any(mark in remark for mark in ("\\", ":math:", "``", "$"))] == []

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from nigemizu.output.air import write_air
     from nigemizu.output.diagram import ray_diagram
+    from nigemizu.output.displacement import displacement_figure
     from nigemizu.output.files import ready_to_write, whole_file, whole_folder
     from nigemizu.output.film import write_film
     from nigemizu.output.frames import FrameFolder
@@ -25,6 +26,7 @@ __all__ = [
     "Outline",
     "Profile",
     "Provenance",
+    "displacement_figure",
     "encoded",
     "ray_diagram",
     "read_layers",
@@ -45,6 +47,7 @@ __all__ = [
 _HOMES: Final = {
     "air": ("write_air",),
     "diagram": ("ray_diagram",),
+    "displacement": ("displacement_figure",),
     "files": ("ready_to_write", "whole_file", "whole_folder"),
     "film": ("write_film",),
     "frames": ("FrameFolder",),

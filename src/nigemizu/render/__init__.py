@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, Final
 from nigemizu.render.camera import Camera
 from nigemizu.render.diffraction import diffract
 from nigemizu.render.light import Light
-from nigemizu.render.materials import Asphalt, Checker, Colour, Masonry, Material, Sand, Texture
+from nigemizu.render.materials import Asphalt, Checker, Colour, Dots, Masonry, Material, Sand, Texture
 from nigemizu.render.noise import Noise, add_noise
 from nigemizu.render.objects import (
+    Aircraft,
     Box,
     Ground,
     Hills,
@@ -39,11 +40,13 @@ if TYPE_CHECKING:
     from nigemizu.render.variant import register, select_variant
 
 __all__ = [
+    "Aircraft",
     "Asphalt",
     "Box",
     "Camera",
     "Checker",
     "Colour",
+    "Dots",
     "Frame",
     "Ground",
     "Hills",

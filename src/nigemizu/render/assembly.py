@@ -13,11 +13,12 @@ import mitsuba as mi
 import numpy as np
 
 from nigemizu.errors import InputError
-from nigemizu.render import meshes, vehicle
+from nigemizu.render import aircraft, meshes, vehicle
 from nigemizu.render.camera import Camera
 from nigemizu.render.light import Light
-from nigemizu.render.materials import Asphalt, Checker, Colour, Masonry, Material, Sand, Texture
+from nigemizu.render.materials import Asphalt, Checker, Colour, Dots, Masonry, Material, Sand, Texture
 from nigemizu.render.objects import (
+    Aircraft,
     Box,
     Ground,
     Hills,
@@ -35,7 +36,7 @@ from nigemizu.render.sky import bake
 
 __all__ = ["build"]
 
-# Gloss and colour of the car's parts that the paint does not colour.
+# Gloss and colour of the parts of cars and aircraft that the paint does not colour.
 _PARTS: Final[dict[str, tuple[tuple[float, float, float], bool]]] = {
     "glass": ((0.012, 0.014, 0.016), True),
     "dark": ((0.012, 0.012, 0.012), False),
@@ -44,6 +45,7 @@ _PARTS: Final[dict[str, tuple[tuple[float, float, float], bool]]] = {
     "lamp": ((0.7, 0.72, 0.72), True),
     "tail": ((0.35, 0.01, 0.01), True),
     "plate": ((0.75, 0.75, 0.72), False),
+    "grey": ((0.42, 0.43, 0.44), True),
 }
 _HEADLIGHT: Final = 30.0  # radiance of a lamp that is on, in units of sunlit white
 
@@ -132,7 +134,12 @@ def _shapes(item: Object, key: str, camera: Camera) -> dict[str, Any]:
         case Hills():
             return {"hills": _mesh(meshes.hills(item), _matt(item.colour))}
         case Vehicle():
-            return _vehicle(item)
+            scale, paint = item.length / vehicle.LENGTH, {"paint": item.colour}
+            return _painted(item, vehicle.car(), scale, paint, item.headlights)
+        case Aircraft():
+            scale = item.length / aircraft.LENGTH
+            paint = {"paint": item.colour, "fin": item.fin_colour}
+            return _painted(item, aircraft.airliner(), scale, paint, item.lights)
         case MitsubaFile():
             return _foreign(item, key)
 
@@ -196,6 +203,18 @@ def _bsdf(
                 "colour": mi.ScalarColor3f(list(first)),
                 "other": mi.ScalarColor3f(list(second)),
                 "size": material.size,
+            }
+        case Dots():
+            first, second = material.colours
+            texture = {
+                **_seen("nigemizu_dots", camera),
+                "colour": mi.ScalarColor3f(list(first)),
+                "other": mi.ScalarColor3f(list(second)),
+                "diameter": material.diameter,
+                "density": material.density,
+                "seed": material.seed,
+                "centre": list(position),
+                "turn": math.radians(rotation),
             }
         case Masonry():
             texture = {
@@ -289,14 +308,20 @@ def _pole(item: Pole) -> dict[str, Any]:
     return shapes
 
 
-def _vehicle(item: Vehicle) -> dict[str, Any]:
-    scale = item.length / vehicle.LENGTH
+def _painted(
+    item: Vehicle | Aircraft,
+    groups: dict[str, list[meshes.Triangles]],
+    scale: float,
+    paint: dict[str, tuple[float, float, float]],
+    lamps_on: bool,
+) -> dict[str, Any]:
+    """Parts of a vehicle by material, in its place."""
     shapes = {}
-    for name, parts in vehicle.car().items():
-        colour, glossy = (item.colour, True) if name == "paint" else _PARTS[name]
+    for name, parts in groups.items():
+        colour, glossy = (paint[name], True) if name in paint else _PARTS[name]
         bsdf = _glossy(colour) if glossy else _matt(colour)
         extra = {}
-        if name == "lamp" and item.headlights:
+        if name == "lamp" and lamps_on:
             extra["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": _HEADLIGHT}}
         for index, part in enumerate(parts):
             sized = replace(part, vertices=part.vertices * scale)

@@ -10,7 +10,7 @@ from pydantic import Field
 from nigemizu.render.light import Reflectance
 from nigemizu.values import Value
 
-__all__ = ["Asphalt", "Checker", "Colour", "Masonry", "Material", "Sand", "Texture"]
+__all__ = ["Asphalt", "Checker", "Colour", "Dots", "Masonry", "Material", "Sand", "Texture"]
 
 Length = Annotated[float, Field(gt=0, json_schema_extra={"unit": "m"})]
 Positive = Annotated[float, Field(gt=0)]
@@ -132,5 +132,33 @@ class Masonry(Value):
     seed: Annotated[int, Field(ge=0)] = 0
 
 
-Material = Annotated[Colour | Texture | Sand | Asphalt | Checker | Masonry, Field(discriminator="kind")]
+@final
+class Dots(Value):
+    """Round dots at random places, the background of background-oriented schlieren.
+
+    They lie in the plane that the surface faces, one at random in each square of a grid, over one another
+    where they meet.
+
+    Parameters
+    ----------
+    colours : two (r, g, b)
+        Reflectance of the ground and of the dots.
+    diameter : float, m
+        Of a dot; two to three pixels of the picture are best to measure displacements with.
+    density : float
+        Share of the surface that dots would cover if none lay over another: at 0.5 they cover 0.45.
+    seed : int
+        Seed of the pattern.
+    """
+
+    kind: Literal["dots"] = "dots"
+    colours: tuple[Reflectance, Reflectance] = ((0.8, 0.8, 0.8), (0.03, 0.03, 0.03))
+    diameter: Length = 0.002
+    density: Annotated[float, Field(gt=0, le=1.5)] = 0.5
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+Material = Annotated[
+    Colour | Texture | Sand | Asphalt | Checker | Masonry | Dots, Field(discriminator="kind")
+]
 """Any material, told apart by its ``kind``."""

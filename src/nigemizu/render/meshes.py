@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -18,6 +19,7 @@ __all__ = [
     "ellipsoid",
     "hills",
     "loft",
+    "merged",
     "plain",
     "pyramid",
     "pyramid_faces",
@@ -87,6 +89,15 @@ def loft(loops: NDArray[np.float64], smooth: bool = False) -> Triangles:
     centres = np.stack([loops[0].mean(axis=0), loops[-1].mean(axis=0)])
     vertices = np.concatenate([loops.reshape(-1, 3), centres])
     return Triangles(vertices, np.concatenate([sides, caps]), smooth)
+
+
+def merged(parts: Sequence[Triangles]) -> Triangles:
+    """Meshes as one, without texture coordinates; smooth if the first is."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=True)]
+    return Triangles(
+        np.concatenate([part.vertices for part in parts]), np.concatenate(faces), parts[0].smooth
+    )
 
 
 def quad_strip(rows: NDArray[np.float64], smooth: bool = False) -> Triangles:

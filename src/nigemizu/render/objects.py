@@ -12,6 +12,7 @@ from nigemizu.render.materials import Asphalt, Colour, Masonry, Material, Sand
 from nigemizu.values import Value
 
 __all__ = [
+    "Aircraft",
     "Box",
     "Ground",
     "Hills",
@@ -270,6 +271,34 @@ class Vehicle(Value):
 
 
 @final
+class Aircraft(Value):
+    """An airliner with two engines under its wings, on its wheels.
+
+    Parameters
+    ----------
+    position : (x, y, z), m
+        The point of the ground under its middle.
+    heading : float, degrees
+        Where its nose points; 180 = towards the camera at the origin.
+    colour, fin_colour : (r, g, b)
+        Reflectance of the fuselage, and of fin and engines.
+    length : float, m
+        From nose to tail; span (0.91 of it) and height (0.31 of it) follow. The jet pipes are 0.008 of it in
+        front of the middle, 0.153 beside it and 0.047 above the ground.
+    lights : bool
+        Whether the landing lights are switched on.
+    """
+
+    kind: Literal["aircraft"] = "aircraft"
+    position: Position
+    heading: Degrees = 180.0
+    colour: Reflectance = (0.72, 0.73, 0.74)
+    fin_colour: Reflectance = (0.03, 0.10, 0.28)
+    length: Annotated[float, Field(ge=5, le=90, json_schema_extra={"unit": "m"})] = 37.6
+    lights: bool = False
+
+
+@final
 class MitsubaFile(Value):
     """Shapes from a Mitsuba 3 scene of the user's own, in metres with z up.
 
@@ -294,6 +323,7 @@ class MitsubaFile(Value):
 
 
 Object = Annotated[
-    Ground | Pyramid | Box | Pole | Sphere | Mesh | Hills | Vehicle | MitsubaFile, Field(discriminator="kind")
+    Ground | Pyramid | Box | Pole | Sphere | Mesh | Hills | Vehicle | Aircraft | MitsubaFile,
+    Field(discriminator="kind"),
 ]
 """Any object, told apart by its ``kind``."""

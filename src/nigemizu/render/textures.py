@@ -35,6 +35,23 @@ def noise_tile(seed: int) -> NDArray[np.float32]:
     return np.asarray((image - image.mean()) / image.std(), dtype=np.float32)
 
 
+def covered_by_dots(density: float) -> float:
+    """Share of a plane that is covered by dots, one at random in each square, of this area in squares.
+
+    A point is bare if no dot's middle lies in the disc around it: one minus its part of each square.
+    """
+    steps = (np.arange(24) + 0.5) / 24
+    radius, angle = np.sqrt(density / np.pi * steps)[:, None], 2 * np.pi * steps
+    disc = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1).reshape(-1, 2)
+    bare = 0.0
+    for x in steps:
+        for y in steps:
+            squares = np.floor(disc + np.array([x, y]))
+            _, counts = np.unique(squares @ [7.0, 1.0], return_counts=True)
+            bare += float(np.prod(1 - density * counts / len(disc)))
+    return 1 - bare / len(steps) ** 2
+
+
 @functools.cache
 def texture_classes(variant: str) -> dict[str, Any]:
     """Plug-in name → class, under `variant`, which must be the one in use."""
@@ -166,23 +183,72 @@ def texture_classes(variant: str) -> dict[str, Any]:
             y = 2 * _pulses(si.p.y, self.size, 2 * self.size, wide_y) - 1
             return dr.lerp(self.colour, self.other, 0.5 + 0.5 * x * y)
 
-    class Masonry(Procedural):
-        """Courses of stones; `base` is the z of the first, `turn` the building's rotation in radians."""
+    class Placed(Procedural):
+        """A pattern that goes with an object, at `centre` and turned about the vertical by `turn` radians."""
 
         def __init__(self, props: Any) -> None:
             super().__init__(props)
-            self.course = float(props["course"])
             self.salt = 100_000 * (1 + props.get("seed", 0) % 40_000)
             self.centre = mi.ScalarPoint3f(props.get("centre", mi.ScalarPoint3f(0)))
             self.turn = float(props.get("turn", 0.0))
 
-        def pattern(self, si: Any) -> Any:
-            across, _, _ = self.footprint(si)
+        def own(self, si: Any) -> tuple[Any, Any]:
+            """Place and normal in the object's own coordinates."""
             c, s = float(np.cos(self.turn)), float(np.sin(self.turn))
             p, n = si.p - self.centre, si.n
-            x, y = c * p.x + s * p.y, c * p.y - s * p.x
-            facing_x = dr.abs(c * n.x + s * n.y) > dr.abs(c * n.y - s * n.x)
-            along = dr.select(facing_x, y, x + 1000.0)
+            return (
+                mi.Point3f(c * p.x + s * p.y, c * p.y - s * p.x, p.z),
+                mi.Normal3f(c * n.x + s * n.y, c * n.y - s * n.x, n.z),
+            )
+
+    class Dots(Placed):
+        """Dots in the plane that the surface faces: one at random in each square of a grid."""
+
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            self.other = _opaque(mi.Color3f(props["other"]))
+            self.radius = float(props["diameter"]) / 2
+            density = float(props["density"])
+            self.side = self.radius * float(np.sqrt(np.pi / density))
+            self.mean_covered = covered_by_dots(density)
+
+        def pattern(self, si: Any) -> Any:
+            across, _, _ = self.footprint(si)
+            p, n = self.own(si)
+            upright = dr.abs(n.z) < 0.7
+            facing_x = dr.abs(n.x) > dr.abs(n.y)
+            x = dr.select(upright & facing_x, p.y, p.x) / self.side
+            y = dr.select(upright, p.z, p.y) / self.side
+            column, row = dr.floor(x), dr.floor(y)
+            bare = mi.Float(1)
+            for up in (-1, 0, 1):
+                for right in (-1, 0, 1):
+                    away = self.distance(x - (column + right), y - (row + up), column + right, row + up)
+                    edge = (self.radius - self.side * away) / dr.maximum(across, 1e-9)
+                    bare *= 1 - dr.clip(edge + 0.5, 0, 1)
+            # Of dots much smaller than a pixel the mean is left.
+            visible = dr.exp(-((across / (4 * self.radius)) ** 4))
+            covered = dr.lerp(mi.Float(self.mean_covered), 1 - bare, visible)
+            return dr.lerp(self.colour, self.other, covered)
+
+        def distance(self, x: Any, y: Any, column: Any, row: Any) -> Any:
+            """From (x, y) in a square to its dot, in sides of the square."""
+            first: Any = mi.UInt32(mi.Int32(column)) + self.salt
+            second: Any = mi.UInt32(mi.Int32(row))
+            a, b = mi.sample_tea_32(first, second, 16)
+            return dr.sqrt((x - mi.Float(a) * 2.0**-32) ** 2 + (y - mi.Float(b) * 2.0**-32) ** 2)
+
+    class Masonry(Placed):
+        """Courses of stones."""
+
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            self.course = float(props["course"])
+
+        def pattern(self, si: Any) -> Any:
+            across, _, _ = self.footprint(si)
+            p, n = self.own(si)
+            along = dr.select(dr.abs(n.x) > dr.abs(n.y), p.y, p.x + 1000.0)
             row = dr.floor(p.z / self.course)
             length = 1.7 * self.course
             shifted = along / length + 0.618 * row
@@ -203,7 +269,12 @@ def texture_classes(variant: str) -> dict[str, Any]:
             drawn = mi.sample_tea_float32(row, stone)
             return (drawn - 0.5) * float(np.sqrt(12.0))
 
-    return {"nigemizu_ground": Ground, "nigemizu_checker": Checker, "nigemizu_masonry": Masonry}
+    return {
+        "nigemizu_ground": Ground,
+        "nigemizu_checker": Checker,
+        "nigemizu_dots": Dots,
+        "nigemizu_masonry": Masonry,
+    }
 
 
 def _opaque(value: Any) -> Any:

@@ -107,7 +107,8 @@ def _check_memory(scene: Scene, available: Callable[[], int | None]) -> None:
 
 
 def _check_extent(scene: Scene) -> None:
-    if scene.tracer.beyond != "straight":
+    # Around sources the grid is what they heat, and not what is seen.
+    if scene.tracer.beyond != "straight" or scene.sources:
         return
     low, high = scene.grid.x
     right, left = scene.grid.y

@@ -56,7 +56,8 @@ class RenderedPicture:
         """Write ``.png`` (8 bits, sRGB) or ``.exr`` (linear), whole or not at all, and return where it is.
 
         The scene and the `command` are embedded, so that the picture can be made again. Ground truth, if
-        there is any, goes beside it, into ``NAME_truth.exr`` and ``NAME_truth.nc``.
+        there is any, goes beside it, into ``NAME_truth.exr`` and ``NAME_truth.nc``, and as a figure of the
+        displacement into ``NAME_truth.png``.
         """
         from nigemizu.output import Provenance, write_picture
 
@@ -64,5 +65,5 @@ class RenderedPicture:
         provenance = Provenance(scene=self.scene.to_toml(), command=command)
         written = write_picture(path, self.pixels, provenance=provenance)
         if self.truth is not None:
-            self.truth.save(path.with_name(f"{path.stem}_truth"), command=command)
+            self.truth.save(path.with_name(f"{path.stem}_truth"), command=command, figure=True)
         return written

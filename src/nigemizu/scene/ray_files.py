@@ -132,7 +132,7 @@ def _outlines(scene: Scene) -> list[Outline]:
 
 def _silhouette(entry: Object) -> tuple[Coordinates, Corners] | None:
     """Place of an object and its corners around it [m]; None for what has no place of its own."""
-    from nigemizu.render import Box, Pole, Pyramid, Sphere, Vehicle
+    from nigemizu.render import Aircraft, Box, Pole, Pyramid, Sphere, Vehicle
 
     match entry:
         case Pyramid():
@@ -142,7 +142,7 @@ def _silhouette(entry: Object) -> tuple[Coordinates, Corners] | None:
             return entry.position, _rectangle(entry.size[0], entry.size[2])
         case Pole():
             return entry.position, _rectangle(entry.diameter, entry.height)
-        case Vehicle():
+        case Vehicle() | Aircraft():
             return entry.position, _rectangle(entry.length, entry.length / 3.0)
         case Sphere():
             turn = np.linspace(0.0, 2.0 * math.pi, 49)

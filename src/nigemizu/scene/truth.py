@@ -86,15 +86,20 @@ class PictureTruth:
         }
         return xr.Dataset(variables, coordinates, attributes)
 
-    def save(self, stem: Path, *, command: str = "") -> list[Path]:
-        """Write ``STEM.exr`` and ``STEM.nc``, and return where they are."""
-        from nigemizu.output import Provenance, write_layers, write_pixels
+    def save(self, stem: Path, *, command: str = "", figure: bool = False) -> list[Path]:
+        """Write ``STEM.exr`` and ``STEM.nc``, with `figure` ``STEM.png`` too, and return where they are."""
+        from nigemizu.output import Provenance, displacement_figure, write_layers, write_pixels
 
         channels = {channel: getattr(self.layers, name) for name, (channel, _, _) in _LAYERS.items()}
         for prefix, pixels in (("", self.seen), ("straight.", self.straight)):
             channels |= {f"{prefix}{colour}": pixels[..., number] for number, colour in enumerate("RGB")}
         provenance = Provenance(scene=self.scene.to_toml(), command=command)
-        return [
+        written = [
             write_layers(stem.with_name(f"{stem.name}.exr"), channels, provenance=provenance),
             write_pixels(stem.with_name(f"{stem.name}.nc"), self.dataset()),
         ]
+        if figure:
+            place, title = stem.with_name(f"{stem.name}.png"), self.scene.title
+            x, y = self.layers.displacement_x, self.layers.displacement_y
+            written.append(displacement_figure(place, self.seen, x, y, title=title, provenance=provenance))
+        return written

@@ -76,13 +76,13 @@ def require_resolved(
     widths = {"x": (nx, grid.horizontal_step("x")), "y": (ny, grid.horizontal_step("y"))}
     mean = float(np.mean(temperature))
     excess = _excess(ground, temperature)
-    fills = not sources or excess > 0 or isinstance(ground, FluxGround)
+    flux = max(ground.heat_flux.bounds()[1], 0.0) if isinstance(ground, FluxGround) else 0.0
+    fills = not sources or excess > 0 or flux > 0
     for axis, (count, width) in widths.items():
         _require_room(axis, count, count * width, height if fills else 0.0)
     lift = convection.gravity / mean
     if isinstance(ground, FluxGround):
-        flux = max(ground.heat_flux.bounds()[1], 0.0) / ground.heat_capacity
-        fall = (lift * height * flux) ** (1 / 3)
+        fall = (lift * height * flux / ground.heat_capacity) ** (1 / 3)
     else:
         fall = math.sqrt(lift * height * max(excess, 0.0))
     released = max((_speed(source, mean, lift) for source in sources), default=0.0)

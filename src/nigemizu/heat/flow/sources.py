@@ -58,7 +58,7 @@ class Source(Value):
     by ΔT is in truth lighter by about ΔT/T: at 30 K by a tenth, at 300 K by half. What comes out of a flame
     or a jet pipe is right only from where it has mixed down to some ten kelvin; power and thrust, on which a
     plume or a jet depends from there on, are exact. The region stands in nobody's way and adds no mass. A
-    jet of thrust F from an area A is no faster than :math:`\sqrt{F/(\rho A)}`: its size sets its speed at
+    jet of thrust F from an area A reaches :math:`\sqrt{2F/(\rho A)}` in still air: its size sets its speed at
     the start. In a box whose sides are periodic, what leaves comes in again on the other side.
 
     Examples
