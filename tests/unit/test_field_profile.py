@@ -7,11 +7,12 @@ from typing import Any
 import drjit as dr
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline, RegularGridInterpolator
+from scipy.interpolate import CubicHermiteSpline, RegularGridInterpolator
 
 from nigemizu import field
 from nigemizu.errors import InputError
 from nigemizu.field.background import chord_pieces, merged_pieces, spline_pieces
+from nigemizu.field.splines import column_slopes
 
 SINGLE, DOUBLE = field.types("llvm", "single"), field.types("llvm", "double")
 
@@ -24,6 +25,11 @@ HEIGHTS = pytest.mark.parametrize("z", [EVEN, STRETCHED], ids=["even", "stretche
 
 def profile(z: np.ndarray) -> np.ndarray:
     return 2.7e-4 - 2e-5 * np.exp(-z / 0.3)
+
+
+def spline_of(z: np.ndarray, values: np.ndarray) -> CubicHermiteSpline:
+    """SciPy's cubics with the slopes at the nodes that have a test of their own (test_field_splines)."""
+    return CubicHermiteSpline(z, values, column_slopes(z, values))
 
 
 def uneven(z: np.ndarray) -> np.ndarray:
@@ -56,7 +62,7 @@ def test_it_is_a_spline_through_the_means_and_a_trilinear_rest(z: np.ndarray) ->
     data, points = uneven(z), inside(z)
     n, gradient = look_up(field.TrilinearVolume(X, Y, z, data, DOUBLE, background="profile"), points)
     means = data.mean(axis=(1, 2))
-    spline = CubicSpline(z, means)
+    spline = spline_of(z, means)
     rest = RegularGridInterpolator((z, Y, X), data - means[:, None, None])
     assert np.max(np.abs(n - 1 - spline(points[:, 2]) - rest(points[:, ::-1]))) < 1e-15
     plain = look_up(field.TrilinearVolume(X, Y, z, data, DOUBLE), points)
@@ -111,7 +117,7 @@ def test_stratified_air_needs_no_voxels(z: np.ndarray, beyond: Any, background: 
     points = inside(z)
     n, gradient = look_up(volume, points)
     if background == "profile":
-        spline = CubicSpline(z, profile(z))
+        spline = spline_of(z, profile(z))
         value, slope = spline(points[:, 2]), spline(points[:, 2], 1)
     else:
         cell = np.searchsorted(z, points[:, 2], side="right") - 1
@@ -130,7 +136,7 @@ def test_stratified_air_needs_no_voxels(z: np.ndarray, beyond: Any, background: 
 @HEIGHTS
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-7, 1e-6])
 def test_joined_cells_keep_the_slope(z: np.ndarray, tolerance: float) -> None:
-    spline = CubicSpline(z, profile(z))
+    spline = spline_of(z, profile(z))
     joined, edges = merged_pieces(z, spline_pieces(z, profile(z)), tolerance)
     heights = np.linspace(z[0], z[-1], 4001)[:-1]
     piece = np.searchsorted(edges, heights, side="right") - 1

@@ -150,7 +150,7 @@ def test_bad_data_is_refused() -> None:
         field.TrilinearVolume([0, 1, 2], axis, axis, good, DOUBLE)
     with pytest.raises(InputError, match="not finite"):
         field.TrilinearVolume(axis, axis, axis, np.full((2, 2, 2), np.nan), DOUBLE)
-    with pytest.raises(InputError, match="expected straight or extend"):
+    with pytest.raises(InputError, match="expected straight, extend or mean"):
         field.TrilinearVolume(axis, axis, axis, good, DOUBLE, beyond="wrap")  # type: ignore[arg-type]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nigemizu.field.axis import Span
+from nigemizu.field.splines import column_slopes
 from nigemizu.field.types import Types
 
 __all__ = ["Background", "Line", "Piece", "Polynomials", "chord_pieces", "merged_pieces", "spline_pieces"]
@@ -162,16 +163,14 @@ class Polynomials(Background):
 
 
 def spline_pieces(z: NDArray[np.float64], means: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Coefficients (nz − 1, 4) of the interpolating cubic spline, in powers of the fraction of each cell.
+    """Coefficients (nz − 1, 4) of the interpolating cubics, in powers of the fraction of each cell.
 
-    The end condition is not-a-knot; two or three nodes get a line or a parabola.
+    Their slopes are those of `nigemizu.field.splines.column_slopes`; two or three nodes get a line or a
+    parabola.
     """
-    from scipy.interpolate import CubicSpline
-
-    powers = np.diff(z)[:, None] ** np.arange(4)
-    falling: NDArray[np.float64] = CubicSpline(z, means).c.T
-    pieces: NDArray[np.float64] = falling[:, ::-1] * powers
-    return pieces
+    widths, rise, slopes = np.diff(z), np.diff(means), column_slopes(z, means)
+    begin, end = widths * slopes[:-1], widths * slopes[1:]
+    return np.column_stack([means[:-1], begin, 3 * rise - 2 * begin - end, begin + end - 2 * rise])
 
 
 def chord_pieces(means: NDArray[np.float64]) -> NDArray[np.float64]:

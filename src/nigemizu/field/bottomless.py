@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, final
+from typing import Any, Final, final
 
 import drjit as dr
 
@@ -10,6 +10,8 @@ from nigemizu.field.base import BoxedField
 from nigemizu.field.cell import Cell
 
 __all__ = ["Bottomless"]
+
+_NEAR: Final = 1e-7  # of the volume's height
 
 
 @final
@@ -24,7 +26,8 @@ class Bottomless(BoxedField):
     -----
     Of the rays that just reach the ground of hot air, some turn above it and some would turn below it. With
     the air continued, both belong to one smooth family. What they do below the ground is not light; it is
-    for paths that are interpolated, on rays that have met the ground before.
+    for paths that are interpolated, on rays that have met the ground before. The floor stays a face of cells,
+    so that steps end on both sides of it.
     """
 
     def __init__(self, field: BoxedField) -> None:
@@ -32,6 +35,8 @@ class Bottomless(BoxedField):
         super().__init__(field.types, (x0, y0, -dr.inf), upper)
         self._field = field
         self._floor = floor
+        # As near to the floor as this, a ray is on the side that it moves to.
+        self._near = _NEAR * max(upper[2] - floor, 0.0) if upper[2] < float("inf") else _NEAR
 
     @property
     def stratified(self) -> bool:
@@ -42,13 +47,12 @@ class Bottomless(BoxedField):
 
     def cell(self, position: Any, direction: Any, active: Any = True) -> Cell:
         cell = self._field.cell(self._raised(position), direction, active)
-        lower = cell.lower
+        lower, upper = cell.lower, cell.upper
         if lower is not None:
-            # The lowest cell has no floor.
-            lower = type(lower)(lower.x, lower.y, dr.select(lower.z <= self._floor, -dr.inf, lower.z))
-        return Cell(
-            lambda point: self._continued(cell.value_and_gradient, point), lower, cell.upper, cell.reach
-        )
+            below = position.z < self._floor + dr.select(direction.z < 0, self._near, -self._near)
+            lower = type(lower)(lower.x, lower.y, dr.select(below, -dr.inf, lower.z))
+            upper = type(upper)(upper.x, upper.y, dr.select(below, self._floor, upper.z))
+        return Cell(lambda point: self._continued(cell.value_and_gradient, point), lower, upper, cell.reach)
 
     def _raised(self, position: Any) -> Any:
         return type(position)(position.x, position.y, dr.maximum(position.z, self._floor))

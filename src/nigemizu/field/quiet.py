@@ -87,7 +87,7 @@ def find_quiet(
     deviation: NDArray[Any],
     nodes: list[NDArray[np.float64]],
     flatness: float,
-    bend: NDArray[Any] | None = None,
+    slope: NDArray[Any] | None = None,
 ) -> tuple[NDArray[np.uint32], NDArray[np.float64]]:
     """Largest blocks over which no component of the gradient varies by more than `flatness`.
 
@@ -96,9 +96,9 @@ def find_quiet(
     deviation : (nz, ny, nx) floating point, 1
     nodes : list of (nx,), (ny,), (nz,) float64, m
     flatness : float, 1/m
-    bend : (nz, ny, nx) floating point, 1/m²
-        Half the second derivative in z at the nodes, where the deviation is a cubic spline along every
-        column; by default it is linear there.
+    slope : (nz, ny, nx) floating point, 1/m
+        The derivative in z at the nodes, where the deviation is cubic along every column between them; by
+        default it is linear there.
 
     Returns
     -------
@@ -112,10 +112,10 @@ def find_quiet(
     ranges = []
     flat: NDArray[np.bool_] = np.ones([-(-(size - 1) // 4) for size in deviation.shape], dtype=np.bool_)
     for number, axis in enumerate((2, 1, 0)):
-        if bend is None:
+        if slope is None:
             ranges.append(_edge_ranges(deviation, nodes[number], axis))
         else:
-            ranges.append(_spline_ranges(deviation, bend, nodes, axis))
+            ranges.append(_spline_ranges(deviation, slope, nodes, axis))
         flat &= ranges[-1][1] - ranges[-1][0] <= flatness
         if not np.any(flat):
             return np.zeros(flat.shape, dtype=np.uint32), np.zeros((0, 4))
@@ -161,7 +161,7 @@ def _edge_ranges(
 
 
 def _spline_ranges(
-    deviation: NDArray[Any], bend: NDArray[Any], nodes: list[NDArray[np.float64]], axis: int
+    deviation: NDArray[Any], slope: NDArray[Any], nodes: list[NDArray[np.float64]], axis: int
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """The like of `_edge_ranges` for columns that are cubic splines: bounds, across them not the closest."""
     widths = np.diff(nodes[2]).astype(deviation.dtype)[:, None, None]
@@ -169,8 +169,8 @@ def _spline_ranges(
     lows, highs = [], []
     for first in range(0, len(widths), 4):  # one layer of blocks at a time, which takes little memory
         h = widths[first : first + 4]
-        values, bends = (array[first : first + 5] for array in (deviation, bend))
-        low, high = _slope_range(values, bends, h) if axis == 0 else _across(values, bends, h, along, axis)
+        values, slopes = (array[first : first + 5] for array in (deviation, slope))
+        low, high = _slope_range(values, slopes, h) if axis == 0 else _across(values, slopes, h, along, axis)
         low, high = low.min(axis=0, keepdims=True), high.max(axis=0, keepdims=True)
         for other in (1, 2):
             fold = _reduced if other == axis else _closed
@@ -180,29 +180,34 @@ def _spline_ranges(
     return np.concatenate(lows), np.concatenate(highs)
 
 
-def _slope_range(values: NDArray[Any], bends: NDArray[Any], h: NDArray[Any]) -> tuple[Any, Any]:
+def _slope_range(values: NDArray[Any], slopes: NDArray[Any], h: NDArray[Any]) -> tuple[Any, Any]:
     """Least and greatest slope of each column in each cell, where it is quadratic in z."""
-    below, above = bends[:-1], bends[1:]
-    chord = np.diff(values, axis=0) / h
-    begin, end = chord - h / 3 * (2 * below + above), chord + h / 3 * (below + 2 * above)
-    # Where the bend changes its sign the slope turns.
-    difference = below - above
-    turns = below * above < 0
-    turn = begin + h * np.divide(below * below, difference, out=np.zeros_like(below), where=turns)
-    return np.minimum(np.minimum(begin, end), turn), np.maximum(np.maximum(begin, end), turn)
+    begin, end = slopes[:-1], slopes[1:]
+    c2, c3 = _powers(values, slopes, h)
+    # Where the second derivative changes its sign the slope turns.
+    turns = c2 * (c2 + 3 * c3) < 0
+    turn = begin - np.divide(c2 * c2, 3 * c3, out=np.zeros_like(c2), where=turns) / h
+    low, high = np.minimum(begin, end), np.maximum(begin, end)
+    return np.where(turns, np.minimum(low, turn), low), np.where(turns, np.maximum(high, turn), high)
+
+
+def _powers(values: NDArray[Any], slopes: NDArray[Any], h: NDArray[Any]) -> tuple[Any, Any]:
+    """Coefficients of the second and third power of the fraction of each cell."""
+    rise, begin, end = np.diff(values, axis=0), h * slopes[:-1], h * slopes[1:]
+    return 3 * rise - 2 * begin - end, begin + end - 2 * rise
 
 
 def _across(
-    values: NDArray[Any], bends: NDArray[Any], h: NDArray[Any], along: NDArray[Any], axis: int
+    values: NDArray[Any], slopes: NDArray[Any], h: NDArray[Any], along: NDArray[Any], axis: int
 ) -> tuple[Any, Any]:
     """Bounds of the difference quotient along `axis` (1, 2) in each cell, where it is cubic in z."""
     shape = [1, 1, 1]
     shape[axis] = -1
     inverse = (1 / np.diff(along)).reshape(shape)
     quotient = np.diff(values, axis=axis) * inverse
-    bend = np.abs(np.diff(bends, axis=axis) * inverse)
-    # A function leaves its chord by no more than h²/8 times its greatest second derivative.
-    margin = h * h / 4 * np.maximum(bend[:-1], bend[1:])
+    c2, c3 = _powers(quotient, np.diff(slopes, axis=axis) * inverse, h)
+    # A function leaves its chord by no more than an eighth of its greatest second derivative, w running to 1.
+    margin = np.maximum(np.abs(c2), np.abs(c2 + 3 * c3)) / 4
     below, above = quotient[:-1], quotient[1:]
     return np.minimum(below, above) - margin, np.maximum(below, above) + margin
 

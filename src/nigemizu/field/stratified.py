@@ -14,6 +14,7 @@ from nigemizu.field.axis import Span
 from nigemizu.field.background import Polynomials, spline_pieces
 from nigemizu.field.cell import Cell
 from nigemizu.field.quiet import QuietBlocks, find_quiet
+from nigemizu.field.splines import column_slopes
 from nigemizu.field.types import Precision, Types, aligned_zeros
 from nigemizu.field.voxels import Beyond, VoxelField, horizontal_means, read_mesh
 
@@ -34,7 +35,7 @@ class StratifiedVolume(VoxelField):
         n − 1 on the nodes.
     types : Types
         Array types of positions and results.
-    beyond : {"straight", "extend"}
+    beyond : {"straight", "extend", "mean"}
         What lies beyond the sides, as for `TrilinearVolume`.
     flatness : float, 1/m
         By how much the gradient that `cell` gives may differ from that of `value_and_gradient`, so that
@@ -49,24 +50,25 @@ class StratifiedVolume(VoxelField):
 
     Notes
     -----
-    n = 1 + b(z) + δ(x, y, z). Along every column of nodes both parts are the interpolating cubic spline with
-    not-a-knot ends (through two or three nodes, a line or a parabola): b goes through the horizontal means,
-    δ through the rest, so that small differences survive in single precision. Between the columns δ is
-    bilinear. Stored are, side by side for each node, δ and half its second derivative q; in a cell of height
-    h, with w the fraction of it, δ = δ₀ + (δ₁ − δ₀ − c₂ − c₃) w + c₂ w² + c₃ w³, c₂ = h² q₀,
-    c₃ = h² (q₁ − q₀)/3. Where the data do not vary horizontally no voxels are stored at all.
+    n = 1 + b(z) + δ(x, y, z). Along every column of nodes n is the interpolating cubic spline with not-a-knot
+    ends (through two or three nodes, a line or a parabola), held back where the data have a kink, so that it
+    makes no extremes of its own (`nigemizu.field.splines`). b is the spline through the horizontal means, δ
+    the rest, so that small differences survive in single precision. Between the columns δ is bilinear. Stored
+    are, side by side for each node, δ and its derivative s; in a cell of height h, with w the fraction of it,
+    δ = δ₀ + h s₀ w + c₂ w² + c₃ w³, c₂ = 3 (δ₁ − δ₀) − h (2 s₀ + s₁), c₃ = h (s₀ + s₁) − 2 (δ₁ − δ₀). Where
+    the data do not vary horizontally no voxels are stored at all.
 
-    Rays that run along layers meet few faces but those in z, and there n and its first two derivatives in z
-    are continuous. Beyond the mesh the value and gradient are those of the nearest point of the box, except
-    for the horizontal gradient of extended columns, which is 0.
+    Rays that run along layers meet few faces but those in z, and there n and its first derivative in z are
+    continuous, away from kinks the second as well. Beyond the mesh the value and gradient are those of the
+    nearest point of the box, except for the horizontal gradient of extended columns, which is 0.
 
     A block of 4³, 16³ or 64³ cells is quiet if no component of ∇δ varies by more than `flatness` over it;
     `cell` then gives the whole block and a linear δ. It joins cells of b into one cubic where that changes
     db/dz by no more than a quarter of `flatness`.
 
-    Limits: across faces in x and y the gradient jumps, and across a step in the data the spline overshoots.
-    Values are fourth order and gradients third order in the cell height; in the cell's length and breadth
-    values are second order and horizontal gradients first. It takes twice the memory of `TrilinearVolume`.
+    Limits: across faces in x and y the gradient jumps. Values are fourth order and gradients third order in
+    the cell height; in the cell's length and breadth values are second order and horizontal gradients first.
+    It takes twice the memory of `TrilinearVolume`.
 
     References
     ----------
@@ -193,19 +195,18 @@ class StratifiedVolume(VoxelField):
 
     def _powers(self, corner: Any, height: Any, active: Any) -> list[list[Any]]:
         """δ in a cell, by the fractions of it: for each power of w the coefficients of 1, u, v, u v."""
-        c2_per_bend = height * height
-        c3_per_bend = c2_per_bend * (1 / 3)
         powers: list[list[Any]] = [[], [], [], []]
         below, above = (self._bilinear(layer, active) for layer in (corner, corner + self._layer))
-        for (value, bend), (value_above, bend_above) in zip(below, above, strict=True):
-            c2, c3 = bend * c2_per_bend, (bend_above - bend) * c3_per_bend
-            c1 = (value_above - value) - (c2 + c3)
+        for (value, slope), (value_above, slope_above) in zip(below, above, strict=True):
+            rise, c1, end = value_above - value, slope * height, slope_above * height
+            c3 = (c1 + end) - 2 * rise
+            c2 = rise - (c1 + c3)
             for power, coefficient in zip(powers, (value, c1, c2, c3), strict=True):
                 power.append(coefficient)
         return powers
 
     def _bilinear(self, corner: Any, active: Any) -> list[tuple[Any, Any]]:
-        """Coefficients of 1, u, v, u v on one layer: of δ and of its bend."""
+        """Coefficients of 1, u, v, u v on one layer: of δ and of its slope."""
         Float = self.types.Float
         taps = [
             dr.gather(self._record, self._deviation, corner + offset, active)
@@ -244,51 +245,10 @@ def _evaluate(powers: list[list[Any]], X: Any, Y: Any, w: Any) -> tuple[Any, Any
 def _fill(
     records: NDArray[Any], data: NDArray[Any], z: NDArray[np.float64], means: NDArray[np.float64]
 ) -> None:
-    """Write the deviation from the means, and half its second derivative in z, side by side."""
+    """Write the deviation from the means, and its derivative in z, side by side."""
+    mean_slopes = column_slopes(z, means)[:, None, None]
     rows = max(1, SLAB // (data.shape[0] * data.shape[2]))
     for first in range(0, data.shape[1], rows):
-        slab = data[:, first : first + rows] - means[:, None, None]
-        records[:, first : first + rows, :, 0] = slab
-        records[:, first : first + rows, :, 1] = _bends(z, slab)
-
-
-def _bends(z: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Half the second derivative at the nodes of the splines with not-a-knot ends through columns.
-
-    Parameters
-    ----------
-    z : (nz,) float64, m
-    values : (nz, …) float64, 1
-
-    Returns
-    -------
-    (nz, …) float64, 1/m²
-    """
-    bends = np.zeros_like(values)
-    h = np.diff(z)
-    last = len(h)
-    if last < 2:
-        return bends
-    chords = np.diff(values, axis=0) / h.reshape(-1, *[1] * (values.ndim - 1))
-    np.subtract(chords[1:], chords[:-1], out=bends[1:-1])
-    if last == 2:
-        bends[:] = bends[1] / (h[0] + h[1])
-        return bends
-    # h₀ q₀ + 2 (h₀ + h₁) q₁ + h₁ q₂ = 3 (chord₁ − chord₀), and so on; the ends follow from the two next
-    # to each. The diagonal dominates: elimination needs no pivots, and one layer is done at a time.
-    bends[1:-1] *= 3
-    below, diagonal, above = h[:-1].copy(), 2 * (h[:-1] + h[1:]), h[1:].copy()
-    diagonal[0] += h[0] + h[0] ** 2 / h[1]
-    above[0] -= h[0] ** 2 / h[1]
-    diagonal[-1] += h[-1] + h[-1] ** 2 / h[-2]
-    below[-1] -= h[-1] ** 2 / h[-2]
-    for k in range(2, last):
-        factor = below[k - 1] / diagonal[k - 2]
-        diagonal[k - 1] -= factor * above[k - 2]
-        bends[k] -= factor * bends[k - 1]
-    bends[last - 1] /= diagonal[-1]
-    for k in range(last - 2, 0, -1):
-        bends[k] = (bends[k] - above[k - 1] * bends[k + 1]) / diagonal[k - 1]
-    bends[0] = bends[1] + (bends[1] - bends[2]) * (h[0] / h[1])
-    bends[-1] = bends[-2] + (bends[-2] - bends[-3]) * (h[-1] / h[-2])
-    return bends
+        slab = data[:, first : first + rows].astype(np.float64, copy=False)
+        records[:, first : first + rows, :, 0] = slab - means[:, None, None]
+        records[:, first : first + rows, :, 1] = column_slopes(z, slab) - mean_slopes

@@ -31,7 +31,7 @@ class TricubicVolume(VoxelField):
         n − 1 on the nodes.
     types : Types
         Array types of positions and results.
-    beyond : {"straight", "extend"}
+    beyond : {"straight", "extend", "mean"}
         What lies beyond the sides, as for `TrilinearVolume`.
     storage : {"single", "double"}, optional
         Precision of the stored coefficients; by default that of `types`.

@@ -34,11 +34,12 @@ class TrilinearVolume(VoxelField):
         n − 1 on the nodes.
     types : Types
         Array types of positions and results.
-    beyond : {"straight", "extend"}
+    beyond : {"straight", "extend", "mean"}
         What lies beyond the sides. ``straight``: nothing, rays go straight. ``extend``: the outermost
         columns continue in x and y without a horizontal gradient: for ever where the air varies with
-        height alone, else for 20 km, over which the round Earth falls by 31 m. Below the lowest and above
-        the highest node the rays are straight in both cases.
+        height alone, else for 20 km, over which the round Earth falls by 31 m. ``mean``: within one cell the
+        air passes over to the horizontal mean of the volume, which then goes on as far. Below the lowest and
+        above the highest node the rays are straight in all cases.
     background : {"linear", "profile"}
         From what the voxels hold the deviation. ``linear``: the straight line in z nearest to the data;
         n is then trilinear, as in the paper. ``profile``: a cubic spline in z through the horizontal

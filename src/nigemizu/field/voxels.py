@@ -16,7 +16,7 @@ from nigemizu.field.types import Types
 
 __all__ = ["COLUMNS_REACH", "Beyond", "VoxelField", "horizontal_means", "read_mesh"]
 
-Beyond: TypeAlias = Literal["straight", "extend"]
+Beyond: TypeAlias = Literal["straight", "extend", "mean"]
 
 COLUMNS_REACH: Final = 20e3
 """m, how far uneven air goes on beyond extended sides: over 20 km the round Earth drops by 31 m below it."""
@@ -29,7 +29,7 @@ class VoxelField(BoxedField):
     ----------
     nodes : list of (nx,), (ny,), (nz,) float64, m
     types : Types
-    beyond : {"straight", "extend"}
+    beyond : {"straight", "extend", "mean"}
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class VoxelField(BoxedField):
         self._axes = x, y, z
         lower, upper = [float(axis[0]) for axis in nodes], [float(axis[-1]) for axis in nodes]
         self._columns = list(zip(lower[:2], upper[:2], strict=True))
-        self._extended = beyond == "extend"
+        self._extended = beyond != "straight"
         if self._extended:
             lower[:2], upper[:2] = [-np.inf] * 2, [np.inf] * 2
         super().__init__(types, tuple(lower), tuple(upper))
@@ -105,11 +105,14 @@ def read_mesh(
 ) -> tuple[list[NDArray[np.float64]], NDArray[Any]]:
     """Nodes by axis (x, y, z) and data (z, y, x), refused unless they make a volume.
 
-    An extended axis of one node is given a second one: the air does not vary along it at all. The volume will
-    store `per_node` numbers for each.
+    An extended axis of one node is given a second one: the air does not vary along it at all. Where the mean
+    goes on beyond the sides, a column of it is put around the volume. The volume will store `per_node`
+    numbers for each node.
     """
-    if beyond not in ("straight", "extend"):
-        raise InputError("no such continuation", key="beyond", value=beyond, expected="straight or extend")
+    if beyond not in ("straight", "extend", "mean"):
+        raise InputError(
+            "no such continuation", key="beyond", value=beyond, expected="straight, extend or mean"
+        )
     data = np.asarray(refractivity)
     nodes = [np.asarray(axis, dtype=np.float64) for axis in (x, y, z)]
     expected = tuple(axis.size for axis in reversed(nodes))
@@ -127,11 +130,19 @@ def read_mesh(
         )
     if not np.all(np.isfinite(data)):
         raise InputError("the refractivity is not finite everywhere", key="refractivity")
-    if beyond == "extend":
+    if beyond != "straight":
+        around = horizontal_means(data)[0][:, None, None]
         for number, dimension in ((0, 2), (1, 1)):
-            if nodes[number].size == 1:
-                nodes[number] = nodes[number][0] + np.array([-0.5, 0.5])
+            axis = nodes[number]
+            if axis.size == 1:
+                nodes[number] = axis[0] + np.array([-0.5, 0.5])
                 data = np.repeat(data, 2, axis=dimension)
+            elif beyond == "mean":
+                nodes[number] = np.concatenate([[2 * axis[0] - axis[1]], axis, [2 * axis[-1] - axis[-2]]])
+                shape = list(data.shape)
+                shape[dimension] = 1
+                end = np.broadcast_to(around, shape).astype(data.dtype)
+                data = np.concatenate([end, data, end], axis=dimension)
     return nodes, data
 
 

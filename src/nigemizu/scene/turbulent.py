@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, final
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
     from nigemizu.heat.turbulence.field import TurbulentField
     from nigemizu.scene.model import Scene
 
-__all__ = ["AddedTurbulence"]
+__all__ = ["AddedTurbulence", "Division"]
 
 FloatArray = NDArray[np.float64]
 
@@ -26,12 +28,16 @@ class AddedTurbulence:
     -----
     At constant pressure n − 1 falls as 1/T: fluctuations T' make of it (n − 1)/(1 + T'/T), T being the
     horizontal mean. The skin of the ground, where it is a node of its own, keeps its temperature.
+
+    Where the turbulence has a `spacing` of its own, the cells of the air are divided first. The nodes between
+    take what is linear between those of the air, which without turbulence bends light as before.
     """
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._field: TurbulentField | None = None
         self._axes: tuple[FloatArray, ...] = ()
+        self._divisions: tuple[Division, ...] = ()
 
     def to(
         self,
@@ -41,8 +47,8 @@ class AddedTurbulence:
         refractivity: FloatArray,
         temperature: FloatArray | None,
         time: float,
-    ) -> FloatArray:
-        """n − 1 (nz, ny, nx) with the turbulence of an instant [s].
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray | None]:
+        """The air of an instant with its turbulence.
 
         Parameters
         ----------
@@ -52,41 +58,101 @@ class AddedTurbulence:
             Horizontal mean.
         time : float, s
 
+        Returns
+        -------
+        x, y, z, refractivity, temperature
+            On the mesh of the turbulence, which is that of the air unless it has a `spacing`.
+
         Raises
         ------
         InputError
             Where the temperature is unknown or the nodes are not equally spaced along x and y.
         """
-        if self._scene.turbulence is None:
-            return refractivity
+        turbulence = self._scene.turbulence
+        if turbulence is None:
+            return x, y, z, refractivity, temperature
         if temperature is None:
             raise InputError(
                 "turbulence needs the temperature of the air, and the dataset holds its refractivity alone",
                 key="turbulence",
             )
+        axes = (x, y, z)
+        if len(self._axes) != len(axes) or not all(map(np.array_equal, axes, self._axes)):
+            spacing = turbulence.spacing or (math.inf,) * 3
+            self._divisions = tuple(map(Division.of, axes, spacing))
+            self._field = self._make_field(*(division.nodes for division in self._divisions))
+            self._axes = axes
+        assert self._field is not None
+        for axis, division in zip((2, 1, 0), self._divisions, strict=True):
+            refractivity = division.fill(refractivity, axis)
+        temperature = self._divisions[2].fill(temperature, 0)
+        x, y, z = (division.nodes for division in self._divisions)
         skin = int(z[0] == 0.0)
-        field = self._prepared(x, y, z[skin:])
         added = refractivity.copy()
-        added[skin:] /= 1.0 + field.at(time) / temperature[skin:, None, None]
-        return added
+        added[skin:] /= 1.0 + self._field.at(time) / temperature[skin:, None, None]
+        return x, y, z, added, temperature
 
-    def _prepared(self, x: FloatArray, y: FloatArray, z: FloatArray) -> TurbulentField:
+    def _make_field(self, x: FloatArray, y: FloatArray, z: FloatArray) -> TurbulentField:
+        """The turbulence at these nodes, without the skin of the ground."""
         from nigemizu.heat import Grid
         from nigemizu.heat.turbulence.field import TurbulentField
 
-        axes = (x, y, z)
-        known = len(self._axes) == len(axes) and all(map(np.array_equal, axes, self._axes))
-        if self._field is None or not known:
-            assert self._scene.turbulence is not None
-            grid = self._scene.grid.build()
-            if not all(
-                a.shape == b.shape and np.allclose(a, b)
-                for a, b in zip(axes, (grid.x, grid.y, grid.z), strict=True)
-            ):
-                grid = Grid(_faces(x), _faces(y), _faces(z, 0.0))
-            self._field = TurbulentField(grid, self._scene.turbulence, self._scene.wind)
-            self._axes = axes
-        return self._field
+        assert self._scene.turbulence is not None
+        axes = (x, y, z[int(z[0] == 0.0) :])
+        grid = self._scene.grid.build()
+        if not all(
+            a.shape == b.shape and np.allclose(a, b)
+            for a, b in zip(axes, (grid.x, grid.y, grid.z), strict=True)
+        ):
+            grid = Grid(_faces(axes[0]), _faces(axes[1]), _faces(axes[2], 0.0))
+        return TurbulentField(grid, self._scene.turbulence, self._scene.wind)
+
+
+@final
+@dataclass(frozen=True)
+class Division:
+    """Nodes put in between those of an axis, and the way of values to them: linear.
+
+    Attributes
+    ----------
+    nodes : (m,) float64, m
+    before : (m,) int64
+        The node of the axis before each, the last but one at most.
+    fraction : (m,) float64
+        How far each lies on the way to the next.
+    """
+
+    nodes: FloatArray
+    before: NDArray[np.int64]
+    fraction: FloatArray
+
+    @classmethod
+    def of(cls, nodes: FloatArray, spacing: float) -> Self:
+        """Divide the intervals of an axis that are longer than `spacing` into equal parts."""
+        widths = np.diff(nodes)
+        parts = np.maximum(np.ceil(widths / spacing * (1 - 1e-9)), 1).astype(np.int64)
+        before = np.repeat(np.arange(widths.size), parts)
+        number = np.arange(before.size) - np.repeat(np.cumsum(parts) - parts, parts)
+        fraction = number / parts[before] if before.size else np.zeros(0)
+        if not widths.size:
+            return cls(nodes, np.zeros(1, dtype=np.int64), np.zeros(1))
+        return cls(
+            np.append(nodes[before] + fraction * widths[before], nodes[-1]),
+            np.append(before, widths.size - 1),
+            np.append(fraction, 1.0),
+        )
+
+    def fill(self, values: FloatArray, axis: int) -> FloatArray:
+        """Values at the nodes of the axis, along one of the array's axes, at all the nodes."""
+        if values.shape[axis] == self.nodes.size:
+            return values
+        along = [1] * values.ndim
+        along[axis] = -1
+        low = np.take(values, self.before, axis=axis)
+        step = np.take(np.diff(values, axis=axis), self.before, axis=axis)
+        step *= self.fraction.reshape(along)
+        step += low
+        return step
 
 
 def _faces(centres: FloatArray, first: float | None = None) -> FloatArray:

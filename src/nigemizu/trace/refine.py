@@ -390,6 +390,7 @@ def _displacement(states: Array, others: Array, segments: Segments, blocks: NDAr
         for i in (0, 3)
     )
     displaced = np.maximum(offset[-1] / np.maximum(segments.last[blocks], 1.0), deflection[-1])
+    displaced[segments.buried[blocks]] = 0
     # On to the end of each segment; what is seen there is as far away as it is long.
     start = segments.start[blocks].min(axis=2).T
     end = np.maximum(segments.end[blocks], 1.0).T

@@ -24,7 +24,6 @@ _FIRST_STATION: Final = 5.0  # m
 _BETWEEN: Final = 0.5  # of the spread of a block's corners, by which rays between them may leave it
 _DOWN: Final = 8  # rows of scouts in a block: where images fold, some between pass lower than its corners
 _AHEAD: Final = 0.15  # of the spread of the corners' own contacts, by which a segment begins before them
-_DEEP: Final = 0.05  # m below the ground, from where the rays of a block are all given up
 _LEAST_MARGIN: Final = 1e-4  # m
 _APART: Final = 1.5  # largest ratio of the corners' contacts of which that is enough
 _MANY: Final = 1 << 30  # in place of the number of a box, where there are several
@@ -52,6 +51,8 @@ class Segments:
         Whether a corner's ray ran out of steps.
     looks : (B,) bool
         Whether the straight rays can meet anything behind `last`.
+    buried : (B,) bool
+        Whether all rays have met the ground before `last`, so that they show nothing beyond it.
     flown : int
         Rays that were flown to find them.
     """
@@ -64,6 +65,7 @@ class Segments:
     last: FloatArray
     lost: NDArray[np.bool_]
     looks: NDArray[np.bool_]
+    buried: NDArray[np.bool_]
     flown: int
 
 
@@ -114,19 +116,21 @@ def scout(
     y, x = np.meshgrid(down, np.arange(columns + 1.0) * BLOCK[0], indexing="ij")
     records, offsets = _fly_corners(field, view, x.ravel(), y.ravel(), s[1:], accuracy, max_steps)
     lattice = (_STATIONS, _DOWN * rows + 1, columns + 1)
-    height = np.asarray(offsets[2]).reshape(lattice) + view.eye[2]
-    gone = np.asarray(records.outside, dtype=bool).reshape(lattice) | (height < floor - _DEEP)
-    outside = ~_any_in_blocks(~gone, rows)
+    outside = np.asarray(records.outside, dtype=bool).reshape(lattice)
+    lit = np.asarray(records.lowest).reshape(lattice) >= floor
+    # A ray between scouts that have all met the ground may pass above it: those next to a ray of light may.
+    gone = ~_any_in_blocks(~outside & _with_neighbours(lit), rows)
     lost = _any_in_blocks(np.asarray(records.lost, dtype=bool).reshape(lattice)[-1:], rows)[0]
     # One behind the first station from which all scouts fly straight, or are lost to light: rays between
     # them may be bent a little longer.
-    exits = np.where(outside.any(axis=0), outside.argmax(axis=0) + 1, _STATIONS - 1)
+    exits = np.where(gone.any(axis=0), gone.argmax(axis=0) + 1, _STATIONS - 1)
     exits = np.minimum(exits, _STATIONS - 1)
     last = s[1:][exits]
+    buried = ~_any_in_blocks(_with_neighbours(lit[-1:]), rows)[0]
     contacts = _contacts(field, view, boxes, records, offsets, columns, rows, s, accuracy)
     start, end, count = _join(contacts, last)
-    looks = np.any((contacts.end > last) & (contacts.end >= contacts.begin), axis=0)
-    return Segments(columns, rows, start, end, count, last, lost, looks, x.size)
+    looks = np.any((contacts.end > last) & (contacts.end >= contacts.begin), axis=0) & ~buried
+    return Segments(columns, rows, start, end, count, last, lost, looks, buried, x.size)
 
 
 @final
@@ -196,6 +200,18 @@ def _any_in_blocks(scouts: NDArray[np.bool_], rows: int) -> NDArray[np.bool_]:
     strips = [scouts[:, number::_DOWN][:, :rows] for number in range(_DOWN + 1)]
     sides = np.logical_or.reduce(strips)
     return np.asarray(sides[..., :-1] | sides[..., 1:]).reshape(len(scouts), -1)
+
+
+def _with_neighbours(scouts: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether it holds for a scout (K, rows of scouts, columns + 1) or one next to it."""
+    result = scouts.copy()
+    for axis in (1, 2):
+        lines = np.moveaxis(result, axis, 0)
+        spread = lines.copy()
+        spread[1:] |= lines[:-1]
+        spread[:-1] |= lines[1:]
+        result = np.moveaxis(spread, 0, axis)
+    return result
 
 
 def _strips(types: Any, offsets: list[Any], stray: Any, columns: int, rows: int) -> tuple[list[Any], Any]:

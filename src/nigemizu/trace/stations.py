@@ -78,7 +78,7 @@ def fly(
     size : int
         Number of states that are written, by all rays together.
     ways_only : bool
-        Leave out directions, steps and least heights.
+        Leave out directions and steps.
 
     Notes
     -----
@@ -98,7 +98,7 @@ def fly(
         outside=dr.opaque(UInt32, 0, shape=size),
         lost=dr.opaque(UInt32, 0, shape=size),
         steps=dr.opaque(UInt32, 0, shape=rest),
-        lowest=dr.opaque(Float, 0, shape=rest),
+        lowest=dr.opaque(Float, 0, shape=size),
     )
     _fly(field, accuracy, UInt32(max_steps), flight, stations, records)
     return records
@@ -144,9 +144,9 @@ def _write(records: _Records, index: Any, flight: Flight, limit: Any, max_steps:
     dr.scatter(records.outside, dr.select(flight.inside, 0, one), index)
     lost = flight.inside & (flight.steps >= max_steps)
     dr.scatter(records.lost, dr.select(lost, one, 0), index)
+    dr.scatter(records.lowest, flight.turning, index)
     if not len(records.steps):
         return
     for axis in range(3):
         dr.scatter(records.direction[axis], ahead[axis], index)
     dr.scatter(records.steps, flight.steps, index)
-    dr.scatter(records.lowest, flight.turning, index)

@@ -65,10 +65,11 @@ class Tracer(Value):
         "fraction of a pixel; 0 tests after every interval. Rays that graze a hot ground lie closer to each "
         "other than pixels elsewhere: at 0.05 the vanishing line is a pixel low",
     )
-    beyond: Literal["straight", "extend"] = Described(
+    beyond: Literal["straight", "extend", "mean"] = Described(
         "straight",
         description="air beyond the sides of the volume; straight: no bending there, "
-        "extend: the outermost columns continue, for 20 km where the air is uneven",
+        "extend: the outermost columns continue, for 20 km where the air is uneven; mean: so does its "
+        "horizontal mean, for uneven air whose outermost eddies would be drawn out",
     )
     layers: int = Described(40, ge=2, le=100_000, description="layered: number of panes")
     layer_spacing: Literal["equal-index", "equal-height"] = Described(

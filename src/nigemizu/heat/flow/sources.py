@@ -34,6 +34,7 @@ class Source(Value):
     size : (x, y, z), m
         Whole widths; those of a ball are its diameters, and a cylinder stands upright. Of a cell at least.
     shape : {"ball", "box", "cylinder"}
+        Of the region.
     power : float, W
         Heat that the air receives; below zero it is cooled.
     thrust : float, N

@@ -19,6 +19,7 @@ FREE_CONVECTION: Final = -4.0 / 3.0
 Pascals = Annotated[float, Field(json_schema_extra={"unit": "Pa"})]
 TemperatureStructure = Annotated[float, Field(gt=0, json_schema_extra={"unit": "K2 m-2/3"})]
 IndexStructure = Annotated[float, Field(gt=0, json_schema_extra={"unit": "m-2/3"})]
+Spacing = Annotated[float, Field(gt=0, json_schema_extra={"unit": "m"})]
 
 
 @final
@@ -87,6 +88,11 @@ class Turbulence(Value):
         Outer scale in units of the height above the ground; never above `outer_scale` where both are given.
     largest : float, m, optional
         Leave out, by a smooth filter, the eddies above this wavelength: because a computed flow makes them.
+    spacing : (float, float, float), m, optional
+        Divide the cells of the air along x, y and z into parts no larger than this before eddies are added,
+        so that there is room for eddies smaller than those cells. What bends light that travels along x are
+        eddies that are small along y and z: ``[4.0, 0.2, 0.1]`` is a good mesh for it. By default the air's
+        own cells are used.
     eddy_lifetime : float, s, or "frozen"
         Time after which an eddy of one metre is another one; larger and smaller eddies in proportion to
         their wavelength^(2/3). ``"frozen"``: for ever, and then the field comes back when the wind has
@@ -141,6 +147,7 @@ class Turbulence(Value):
     outer_scale: Metres | None = Field(default=None, gt=0)
     outer_scale_per_height: float | None = Field(default=None, gt=0)
     largest: Metres | None = Field(default=None, gt=0)
+    spacing: tuple[Spacing, Spacing, Spacing] | None = None
     eddy_lifetime: Annotated[float, Field(gt=0, json_schema_extra={"unit": "s"})] | Literal["frozen"] = 1.4
     unresolved: Literal["left out", "folded"] = "left out"
     seed: int = Field(default=0, ge=0)
