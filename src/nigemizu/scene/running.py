@@ -139,7 +139,7 @@ def _volume(scene: Scene, dataset: xarray.Dataset, time: float, turbulence: Adde
 
     x, y, z, refractivity = refractivity_at(dataset, time, scene.air)
     temperature = mean_temperature_at(dataset, time, scene.air)
-    return AirVolume(x, y, z, turbulence.to(x, y, z, refractivity, temperature, time), temperature)
+    return AirVolume(*turbulence.to(x, y, z, refractivity, temperature, time))
 
 
 def open_air(air: xarray.Dataset | str | os.PathLike[str]) -> xarray.Dataset:
