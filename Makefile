@@ -3,7 +3,7 @@ SCENE ?= pyramid
 BIN := .venv/bin
 export PYTHON
 
-.PHONY: run test film bench gallery docs setup lock clean help
+.PHONY: run test film bench gallery validation docs setup lock clean help
 
 run:  ## set up, then render the scene to out/pyramid.png (SCENE=road for another one)
 	@tools/setup
@@ -30,6 +30,11 @@ gallery:  ## set up, then render again every picture of the README and the docum
 	@tools/setup
 	@tools/gallery
 
+validation:  ## set up, then compute again the flows and films of the validation pages (a quarter of an hour)
+	@tools/setup
+	@cd docs && ../$(BIN)/python -m generators.convection_runs
+	@cd docs && ../$(BIN)/python -m generators.arrival_films
+
 docs:  ## set up, then build the documentation in docs/_build/html
 	@tools/setup --dev
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
@@ -46,4 +51,4 @@ clean:  ## remove what the other commands made, except .venv
 	@find src tests docs benchmarks examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
 help:  ## show this list
-	@sed -n 's/^\([a-z]*\):  ## /\1: /p' Makefile | while IFS=: read -r name what; do printf '  make %-8s%s\n' "$$name" "$$what"; done
+	@sed -n 's/^\([a-z]*\):  ## /\1: /p' Makefile | while IFS=: read -r name what; do printf '  make %-11s%s\n' "$$name" "$$what"; done

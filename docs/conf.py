@@ -38,14 +38,26 @@ html_static_path = []
 
 
 def _generate(app: Sphinx) -> None:
-    from generators import command_line, python_api, scene_reference, validation
+    from generators import (
+        arrival_page,
+        command_line,
+        convection_page,
+        python_api,
+        scene_reference,
+        turbulence_page,
+        validation,
+    )
 
-    parts = HERE / "_generated" / "parts"
-    parts.mkdir(parents=True, exist_ok=True)
+    parts, images = HERE / "_generated" / "parts", HERE / "_generated" / "images"
+    for folder in (parts, images):
+        folder.mkdir(parents=True, exist_ok=True)
     command_line.write(parts / "command_line.rst")
     scene_reference.write(parts / "scene.rst")
     python_api.write(HERE / "_generated")
     validation.write(parts / "validation.rst")
+    convection_page.write(parts / "convection.rst", images / "convection.svg")
+    turbulence_page.write(parts / "turbulence.rst", images / "turbulence.svg")
+    arrival_page.write(parts, images)
 
 
 def setup(app: Sphinx) -> None:
