@@ -7,59 +7,27 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final, final
 
-import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
 from nigemizu.field import Field
 from nigemizu.trace.scout import BLOCK, Segments
-from nigemizu.trace.stations import Stations, fly
+from nigemizu.trace.stations import fly_places
+from nigemizu.trace.table import RECORD, PathTable, records_of
 from nigemizu.trace.view import View
 
-__all__ = ["RECORD", "Flown", "PathTable", "fly_places", "refine"]
+__all__ = ["OpenGrid", "displaced", "fly_nodes", "refine"]
 
 FloatArray = NDArray[np.float64]
 Array = NDArray[np.floating[Any]]
 
-RECORD: Final = 8  # numbers per state: offset, 0, deflection, 0
 _FEWEST: Final = (2, 2)  # cells of a block, across and down, between the nodes whose rays are flown
 _MOST: Final = (16, 64)
 _FINEST: Final = (32, 128)  # the same of the table, which is linear in between
 _LOCAL: Final = 4  # degree of the polynomials that lead from one to the other
 _GAIN: Final = 0.25  # of what the coarser grid misses, that the finer one may miss
-_WORTH: Final = 0.5  # nodes per ray
+_WORTH: Final = 0.3  # nodes per ray
 _POLYNOMIAL, _LINEAR = 0.35, 0.25  # of the accuracy, for each of the two and each direction
-
-
-@final
-@dataclass(frozen=True)
-class PathTable:
-    """States of the paths at the nodes of each block; B blocks.
-
-    Attributes
-    ----------
-    records : (K * RECORD,) float
-        Offset from the straight ray [m] and deflection of the direction [1] at the beginning of each
-        segment and behind the last one, in the view's frame.
-    base : (B,) uint32
-        Index of a block's first record: ``base + (segment * rows + row) * columns + column``, each one
-        more than the cells.
-    cells : (B, 2) uint32
-        Cells of its grid across and down; 0 where the paths are not smooth and each ray must be marched.
-    error : (B,) float64, rad
-        Estimated displacement that the sharing adds.
-    steps : float
-        Mean steps of the paths flown.
-    flown : int
-        Paths flown for the table.
-    """
-
-    records: Array
-    base: NDArray[np.uint32]
-    cells: NDArray[np.uint32]
-    error: FloatArray
-    steps: float
-    flown: int
 
 
 def refine(
@@ -93,17 +61,18 @@ def refine(
     error of the polynomial through all of them (Lagrange's, of degree 2 or 4). Where it is too large the
     cells are halved; else the table's own grid is filled from the polynomials, so finely that between its
     nodes it may be linear. A block whose finest grid does not suffice, or would have too many nodes if each
-    halving brought the error down to a quarter, or which has a ray that runs out of steps, is not shared.
+    halving brought the error down to a quarter, or which has a ray that runs out of steps, is not shared as a
+    whole (but see `nigemizu.trace.cellwise`).
     """
     table = _Table(len(segments.count))
     flown, steps = 0, 0.0
     all_ = np.flatnonzero(~segments.lost)
-    waiting = [_Open(_FEWEST, all_, None, (1, 1))] if len(all_) else []
+    waiting = [OpenGrid(_FEWEST, all_, None, (1, 1))] if len(all_) else []
     while waiting:
-        round_ = _fly_nodes(field, view, segments, waiting, integration, max_steps)
+        round_ = fly_nodes(field, view, segments, waiting, integration, max_steps)
         flown += round_.rays
         steps += round_.steps
-        next_: dict[tuple[Any, Any], list[_Open]] = {}
+        next_: dict[tuple[Any, Any], list[OpenGrid]] = {}
         for part, states, lost in zip(waiting, round_.states, round_.lost, strict=True):
             blocks = part.blocks
             wrong = [
@@ -117,7 +86,7 @@ def refine(
                 states[..., good], segments, blocks[good], (wrong[0] + wrong[1])[good], _LINEAR * accuracy
             )
             for finer, factors, members in _doubled(part.grid, coarse, _MOST):
-                opened = _Open(finer, blocks[members], states[..., members], factors)
+                opened = OpenGrid(finer, blocks[members], states[..., members], factors)
                 next_.setdefault((finer, factors), []).append(opened)
         waiting = [_merged(parts) for parts in next_.values()]
     return table.frozen(steps, flown)
@@ -131,7 +100,7 @@ def _nodes(grid: tuple[int, int], wrong: list[FloatArray], accuracy: float) -> F
 
 @final
 @dataclass(frozen=True)
-class _Open:
+class OpenGrid:
     """Blocks that need a finer grid, the states of the coarser one (None at first), and how much finer."""
 
     grid: tuple[int, int]
@@ -140,10 +109,10 @@ class _Open:
     factors: tuple[int, int]
 
 
-def _merged(parts: list[_Open]) -> _Open:
+def _merged(parts: list[OpenGrid]) -> OpenGrid:
     """Blocks that need the same grid, as one."""
     states = np.concatenate([part.states for part in parts if part.states is not None], axis=-1)
-    return _Open(parts[0].grid, np.concatenate([part.blocks for part in parts]), states, parts[0].factors)
+    return OpenGrid(parts[0].grid, np.concatenate([part.blocks for part in parts]), states, parts[0].factors)
 
 
 def _doubled(
@@ -197,10 +166,8 @@ class _Table:
     def _keep(
         self, states: Array, blocks: NDArray[np.intp], cells: tuple[int, int], error: FloatArray
     ) -> None:
-        rows, columns, stops, _, count = states.shape
-        records = np.zeros((count, stops, rows, columns, RECORD), dtype=states.dtype)
-        ordered = states.transpose(4, 2, 0, 1, 3)
-        records[..., :3], records[..., 4:7] = ordered[..., :3], ordered[..., 3:]
+        rows, columns, stops, _, _ = states.shape
+        records = records_of(states)
         per_block = stops * rows * columns
         self.base[blocks] = self.size + per_block * np.arange(len(blocks))
         self.cells[blocks] = cells
@@ -224,8 +191,8 @@ class _Round:
     rays: int
 
 
-def _fly_nodes(
-    field: Field, view: View, segments: Segments, parts: list[_Open], accuracy: float, max_steps: int
+def fly_nodes(
+    field: Field, view: View, segments: Segments, parts: list[OpenGrid], accuracy: float, max_steps: int
 ) -> _Round:
     """Fly the nodes that the coarser grids lack, those of all parts together."""
     stops = segments.start.shape[1] + 1
@@ -249,11 +216,11 @@ def _fly_nodes(
     return _Round(states, lost, flown.steps, at)
 
 
-def _known(part: _Open) -> tuple[slice, slice]:
+def _known(part: OpenGrid) -> tuple[slice, slice]:
     return slice(None, None, part.factors[1]), slice(None, None, part.factors[0])
 
 
-def _fresh(part: _Open) -> NDArray[np.bool_]:
+def _fresh(part: OpenGrid) -> NDArray[np.bool_]:
     """Which nodes (rows, columns) of a part's grid have not been flown yet."""
     fresh = np.ones((part.grid[1] + 1, part.grid[0] + 1), dtype=bool)
     if part.states is not None:
@@ -262,7 +229,7 @@ def _fresh(part: _Open) -> NDArray[np.bool_]:
 
 
 def _places(
-    segments: Segments, part: _Open, fresh: NDArray[np.bool_]
+    segments: Segments, part: OpenGrid, fresh: NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Place of each ray (nodes · blocks) in pixels, and its path lengths (stops, nodes · blocks)."""
     blocks = part.blocks
@@ -279,57 +246,6 @@ def _places(
         ((y + down) * BLOCK[1]).ravel(),
         lengths.reshape(len(lengths), -1),
     )
-
-
-@final
-@dataclass(frozen=True)
-class Flown:
-    """States (6, stops, rays) as offsets from the straight rays [m] and deflections [1], in the view's frame;
-    which rays had left the volume at their last stop, which were lost, the steps of all together, and the
-    least height of each [m]."""
-
-    states: Array
-    outside: NDArray[np.bool_]
-    lost: NDArray[np.bool_]
-    steps: float
-    lowest: Array
-
-
-def fly_places(
-    field: Field,
-    view: View,
-    x: FloatArray,
-    y: FloatArray,
-    lengths: FloatArray,
-    accuracy: float,
-    max_steps: int,
-) -> Flown:
-    """Fly the rays of places x, y (rays,) [pixels] to their path lengths (stops, rays) [m]."""
-    types = field.types
-    Float, UInt32 = types.Float, types.UInt32
-    stops, rays = lengths.shape
-    eye, direction = view.rays(types, x, y)
-    lane, stride = dr.arange(UInt32, rays), dr.opaque(UInt32, rays)
-    lengths = Float(np.ascontiguousarray(lengths).ravel())
-    records = fly(
-        field,
-        eye,
-        direction,
-        accuracy=dr.opaque(Float, accuracy),
-        max_steps=dr.opaque(UInt32, max_steps),
-        stations=Stations(lengths, lane, stride, dr.opaque(UInt32, stops), lane, stride),
-        size=rays * stops,
-    )
-    dr.eval(records.position, records.direction)
-    d = dr.gather(types.Array3f, direction, dr.arange(UInt32, rays * stops) % stride)
-    offset = view.to_frame(d, types.Array3f(*records.position) - eye - d * lengths)
-    deflection = view.to_frame(d, types.Array3f(*records.direction) - d)
-    dr.eval(offset, deflection)
-    states = np.stack([np.asarray(part) for part in (*offset, *deflection)]).reshape(6, stops, rays)
-    lost = np.asarray(records.lost).reshape(stops, rays)[-1] > 0
-    steps = float(np.asarray(records.steps).reshape(stops, rays)[-1].sum(dtype=np.float64))
-    outside = np.asarray(records.outside).reshape(stops, rays)[-1] > 0
-    return Flown(states, outside, lost, steps, np.asarray(records.lowest).reshape(stops, rays)[-1])
 
 
 @functools.cache
@@ -389,11 +305,16 @@ def _displacement(states: Array, others: Array, segments: Segments, blocks: NDAr
         np.sqrt((squares[:, :, :, i] + squares[:, :, :, i + 1] + squares[:, :, :, i + 2]).max(axis=(0, 1)))
         for i in (0, 3)
     )
-    displaced = np.maximum(offset[-1] / np.maximum(segments.last[blocks], 1.0), deflection[-1])
-    displaced[segments.buried[blocks]] = 0
+    return displaced(offset, deflection, segments, blocks)
+
+
+def displaced(offset: Array, deflection: Array, segments: Segments, blocks: NDArray[np.intp]) -> FloatArray:
+    """Displacement [rad] of what is seen, (…, blocks), for errors of states (…, stops, blocks) [m and 1]."""
+    last = np.maximum(offset[..., -1, :] / np.maximum(segments.last[blocks], 1.0), deflection[..., -1, :])
+    last[..., segments.buried[blocks]] = 0
     # On to the end of each segment; what is seen there is as far away as it is long.
     start = segments.start[blocks].min(axis=2).T
     end = np.maximum(segments.end[blocks], 1.0).T
-    there = (offset[:-1] + deflection[:-1] * np.maximum(end - start, 0)) / end
-    there[np.arange(len(there))[:, None] >= segments.count[blocks]] = 0
-    return np.asarray(np.maximum(displaced, there.max(axis=0)), dtype=np.float64)
+    there = (offset[..., :-1, :] + deflection[..., :-1, :] * np.maximum(end - start, 0)) / end
+    there[..., np.arange(len(start))[:, None] >= segments.count[blocks]] = 0
+    return np.asarray(np.maximum(last, there.max(axis=-2)), dtype=np.float64)

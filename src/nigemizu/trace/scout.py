@@ -204,14 +204,10 @@ def _any_in_blocks(scouts: NDArray[np.bool_], rows: int) -> NDArray[np.bool_]:
 
 def _with_neighbours(scouts: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Whether it holds for a scout (K, rows of scouts, columns + 1) or one next to it."""
-    result = scouts.copy()
-    for axis in (1, 2):
-        lines = np.moveaxis(result, axis, 0)
-        spread = lines.copy()
-        spread[1:] |= lines[:-1]
-        spread[:-1] |= lines[1:]
-        result = np.moveaxis(spread, 0, axis)
-    return result
+    rows = np.pad(scouts, ((0, 0), (1, 1), (0, 0)))
+    rows = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
+    columns = np.pad(rows, ((0, 0), (0, 0), (1, 1)))
+    return np.asarray(columns[..., :-2] | columns[..., 1:-1] | columns[..., 2:])
 
 
 def _strips(types: Any, offsets: list[Any], stray: Any, columns: int, rows: int) -> tuple[list[Any], Any]:

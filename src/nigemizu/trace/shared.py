@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from nigemizu.field import Field, Types
 from nigemizu.trace.ends import ESCAPED, HIT, NOT_TRACED, STOPPED, RayEnd
 from nigemizu.trace.march import march
-from nigemizu.trace.refine import PathTable
 from nigemizu.trace.scout import BLOCK, Segments
 from nigemizu.trace.surfaces import Surface
+from nigemizu.trace.table import PathTable
 from nigemizu.trace.view import View
 
 __all__ = ["INTEGRATION", "SharedPaths", "SharingReport"]
@@ -39,7 +39,7 @@ class SharingReport:
     steps : float
         Mean steps of each.
     shared : float
-        Fraction of the blocks whose rays share their paths; the others are marched one by one.
+        Fraction of the picture whose rays share their paths; the others are marched one by one.
     error : float, rad
         Largest estimated displacement that the sharing adds.
     segments : float
@@ -82,7 +82,8 @@ class SharedPaths:
         self._rows = dr.opaque(UInt32, segments.rows)
         self._most = dr.opaque(UInt32, segments.start.shape[1])
         shared = table.cells[:, 0] > 0
-        self.everywhere = bool(shared.all())
+        torn = table.torn_share
+        self.everywhere = bool(shared.all()) and torn == 0
         length = (segments.end - segments.start.min(axis=2)) / np.maximum(segments.end, 1.0)
         long = (length > _SHORT) & (np.arange(length.shape[1]) < segments.count[:, None])
         self.short = bool(long.mean() <= _FEW)
@@ -91,6 +92,7 @@ class SharedPaths:
         self._last = Float(segments.last)
         self._count = UInt32(segments.count)
         self._looks = types.Bool(segments.looks)
+        self._buried = types.Bool(segments.buried)
         self._base = UInt32(table.base)
         self._cells = [UInt32(np.ascontiguousarray(count)) for count in table.cells.T]
         self._records = types.table(table.records)
@@ -98,7 +100,7 @@ class SharedPaths:
         self.report = SharingReport(
             paths=table.flown + segments.flown,
             steps=table.steps,
-            shared=float(shared.mean()),
+            shared=float(shared.mean()) - torn,
             error=float(table.error.max(initial=0.0)),
             segments=float(segments.count.mean()),
         )
@@ -145,7 +147,7 @@ class SharedPaths:
             "surface": surface,
             "chord_tolerance": chord_tolerance,
         }
-        shared = active & (dr.gather(UInt32, self._cells[0], place.block, active) > 0)
+        shared = self._is_shared(place, active)
         end = self._last_piece(eye, d, place, shared, getattr(surface, "blank", None))
         if surface is not None:
             count = dr.gather(UInt32, self._count, place.block, shared)
@@ -153,7 +155,9 @@ class SharedPaths:
             looks = shared & dr.gather(Bool, self._looks, place.block, shared)
             end = _test_beyond(end, far_surface or surface, looks & (end.status == ESCAPED))
         if not self.everywhere:
-            single = active & ~shared
+            # In blocks all of whose scouts meet the ground a ray that does not is marched, too.
+            stray = dr.gather(Bool, self._buried, place.block, shared) & (end.status == ESCAPED)
+            single = active & (~shared | stray)
             end = _march_singles(self, field, eye, d, place, end, single, options)
         return replace(end, status=dr.select(active, end.status, UInt32(NOT_TRACED)))
 
@@ -187,12 +191,34 @@ class SharedPaths:
         self.everywhere = False
         self.report = replace(self.report, shared=self.report.shared - len(blocks) / self._blocks)
 
-    def last_states(self, direction: Any) -> NDArray[np.float64]:
-        """Offset [m] and deflection where the last straight pieces begin, in the view's frame: (6, N)."""
+    def last_states(self, direction: Any) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Offset [m] and deflection where the last straight pieces begin, in the view's frame, (6, N); and
+        which rays share their paths, (N,)."""
         place = self._find(direction)
         offset, deflection = self._interpolated(place, self._most, True)
-        dr.eval(offset, deflection)
-        return np.stack([np.asarray(part, dtype=np.float64) for part in (*offset, *deflection)])
+        shared = self._is_shared(place, self.types.Bool(True))
+        dr.eval(offset, deflection, shared)
+        states = np.stack([np.asarray(part, dtype=np.float64) for part in (*offset, *deflection)])
+        return states, np.broadcast_to(np.asarray(shared, dtype=bool), states.shape[1:])
+
+    def _is_shared(self, place: _Place, active: Any) -> Any:
+        """Whether rays share their paths: neither in a block that does not nor in a torn cell of one."""
+        shared = active & (dr.gather(self.types.UInt32, self._cells[0], place.block, active) > 0)
+        if self.everywhere:
+            return shared
+        record, _, _ = self._node(place, 0, shared)
+        torn = dr.gather(self.types.Array4f, self._records, record * 2, shared)[3] > 0
+        return shared & ~torn
+
+    def _node(self, place: _Place, segment: Any, active: Any) -> tuple[Any, Any, Any]:
+        """Record of the node to the upper left of rays, and where in the cell behind it they lie."""
+        UInt32, Float = self.types.UInt32, self.types.Float
+        across, down = (dr.maximum(dr.gather(UInt32, cells, place.block, active), 1) for cells in self._cells)
+        x, y = place.x * Float(across), place.y * Float(down)
+        i = UInt32(dr.clip(x, 0, Float(across - 1)))
+        j = UInt32(dr.clip(y, 0, Float(down - 1)))
+        base = dr.gather(UInt32, self._base, place.block, active)
+        return base + (segment * (down + 1) + j) * (across + 1) + i, x - Float(i), y - Float(j)
 
     def _find(self, direction: Any) -> _Place:
         UInt32, Float = self.types.UInt32, self.types.Float
@@ -213,15 +239,8 @@ class SharedPaths:
 
     def _interpolated(self, place: _Place, segment: Any, active: Any) -> tuple[Any, Any]:
         """Offset and deflection at the beginning of a segment, between the four nearest nodes."""
-        UInt32, Float = self.types.UInt32, self.types.Float
-        across, down = (dr.maximum(dr.gather(UInt32, cells, place.block, active), 1) for cells in self._cells)
-        x, y = place.x * Float(across), place.y * Float(down)
-        i = UInt32(dr.clip(x, 0, Float(across - 1)))
-        j = UInt32(dr.clip(y, 0, Float(down - 1)))
-        u, v = x - Float(i), y - Float(j)
-        row = (
-            dr.gather(UInt32, self._base, place.block, active) + (segment * (down + 1) + j) * (across + 1) + i
-        )
+        row, u, v = self._node(place, segment, active)
+        across = dr.maximum(dr.gather(self.types.UInt32, self._cells[0], place.block, active), 1)
         near, far = self._pair(row, u, active), self._pair(row + across + 1, u, active)
         offset, deflection = (dr.lerp(a, b, v) for a, b in zip(near, far, strict=True))
         return offset, deflection

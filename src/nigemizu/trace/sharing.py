@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Final
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nigemizu.field import Bottomless, BoxedField, Field, Types
-from nigemizu.trace.refine import PathTable, fly_places, refine
+from nigemizu.trace.cellwise import lay_cellwise
+from nigemizu.trace.refine import refine
 from nigemizu.trace.scout import BLOCK, Segments, scout
 from nigemizu.trace.shared import INTEGRATION, SharedPaths
+from nigemizu.trace.stations import fly_places
+from nigemizu.trace.table import PathTable
 from nigemizu.trace.view import View, spread
 
 __all__ = ["grounded", "share_paths"]
@@ -62,20 +66,33 @@ def share_paths(
     segments = scout(
         field, view, boxes, accuracy=integration, max_steps=max_steps, farthest=farthest, floor=floor
     )
-    table = refine(
-        field,
-        view,
-        segments,
-        accuracy=accuracy * _SHARING,
-        integration=integration,
-        max_steps=max_steps,
-        rays=rays * BLOCK[0] * BLOCK[1],
-    )
-    paths = SharedPaths(types or field.types, view, segments, table)
-    paths.withdraw(
-        _wrong_blocks(field, view, segments, table, paths, accuracy, integration, max_steps, floor)
-    )
+    options: dict[str, Any] = {
+        "accuracy": accuracy * _SHARING,
+        "integration": integration,
+        "max_steps": max_steps,
+        "rays": rays * BLOCK[0] * BLOCK[1],
+    }
+    table = refine(field, view, segments, **options)
+    test = partial(
+        _wrong_blocks, field, view, segments, accuracy=accuracy, integration=integration,
+        max_steps=max_steps, floor=floor,
+    )  # fmt: skip
+    types = types or field.types
+    paths = SharedPaths(types, view, segments, table)
+    wrong = test(table, paths, _doubtful(table, segments, accuracy))
+    rough = np.union1d(np.flatnonzero((table.cells[:, 0] == 0) & ~segments.lost), wrong)
+    if not len(rough):
+        return paths
+    table, laid = lay_cellwise(field, view, segments, table, rough, **options)
+    paths = SharedPaths(types, view, segments, table)
+    paths.withdraw(test(table, paths, laid))
     return paths
+
+
+def _doubtful(table: PathTable, segments: Segments, accuracy: float) -> NDArray[np.intp]:
+    """Shared blocks that are worth a test."""
+    far = segments.last > _FAR * np.median(segments.last)
+    return np.flatnonzero((table.cells[:, 0] > 0) & ((table.error > _QUIET * accuracy) | far))
 
 
 def _wrong_blocks(
@@ -84,17 +101,18 @@ def _wrong_blocks(
     segments: Segments,
     table: PathTable,
     paths: SharedPaths,
+    blocks: NDArray[np.intp],
+    *,
     accuracy: float,
     integration: float,
     max_steps: int,
     floor: float,
 ) -> NDArray[np.intp]:
-    """Blocks in which a few rays between the nodes, flown for the purpose, differ too much from the table.
+    """Those of the blocks in which a few rays between the nodes, flown for the purpose, differ too much from
+    the table.
 
     What the grids' own comparison cannot see: a kink between two nodes.
     """
-    far = segments.last > _FAR * np.median(segments.last)
-    blocks = np.flatnonzero((table.cells[:, 0] > 0) & ((table.error > _QUIET * accuracy) | far))
     if not len(blocks):
         return blocks
     row, column = np.divmod(blocks, segments.columns)
@@ -105,14 +123,15 @@ def _wrong_blocks(
     lengths = np.tile(segments.last[blocks], tests)[None]
     flown = fly_places(field, view, x, y, lengths, integration, max_steps)
     states = flown.states[:, 0].astype(np.float64)
-    wrong = np.abs(states - paths.last_states(view.rays(paths.types, x, y)[1]))
+    interpolated, shared = paths.last_states(view.rays(paths.types, x, y)[1])
+    wrong = np.abs(states - interpolated)
     offset, deflection = (np.linalg.norm(wrong[i : i + 3], axis=0) for i in (0, 3))
     displaced = np.maximum(offset / np.maximum(lengths[0], 1.0), deflection)
     # A ray that is bent further on than the corners of its block is no part of the table either. One that
     # has been below the ground has met it.
     ends = flown.lowest < floor
     displaced[~flown.outside & ~ends] = np.inf
-    displaced[ends] = 0
+    displaced[ends | ~shared] = 0
     displaced = displaced.reshape(tests, -1).max(axis=0)
     return np.asarray(blocks[displaced > accuracy])
 

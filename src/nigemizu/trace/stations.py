@@ -6,13 +6,20 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
 
 from nigemizu.field import Field
 from nigemizu.trace.controlled import FIRST_TRIAL, ControlledSteps
 from nigemizu.trace.march import run
 from nigemizu.trace.stepping import Flight
+from nigemizu.trace.view import View
 
-__all__ = ["Stations", "fly"]
+__all__ = ["Flown", "Stations", "fly", "fly_places"]
+
+
+FloatArray = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
 
 
 @final
@@ -150,3 +157,54 @@ def _write(records: _Records, index: Any, flight: Flight, limit: Any, max_steps:
     for axis in range(3):
         dr.scatter(records.direction[axis], ahead[axis], index)
     dr.scatter(records.steps, flight.steps, index)
+
+
+@final
+@dataclass(frozen=True)
+class Flown:
+    """States (6, stops, rays) as offsets from the straight rays [m] and deflections [1], in the view's frame;
+    which rays had left the volume at their last stop, which were lost, the steps of all together, and the
+    least height of each [m]."""
+
+    states: Array
+    outside: NDArray[np.bool_]
+    lost: NDArray[np.bool_]
+    steps: float
+    lowest: Array
+
+
+def fly_places(
+    field: Field,
+    view: View,
+    x: FloatArray,
+    y: FloatArray,
+    lengths: FloatArray,
+    accuracy: float,
+    max_steps: int,
+) -> Flown:
+    """Fly the rays of places x, y (rays,) [pixels] to their path lengths (stops, rays) [m]."""
+    types = field.types
+    Float, UInt32 = types.Float, types.UInt32
+    stops, rays = lengths.shape
+    eye, direction = view.rays(types, x, y)
+    lane, stride = dr.arange(UInt32, rays), dr.opaque(UInt32, rays)
+    lengths = Float(np.ascontiguousarray(lengths).ravel())
+    records = fly(
+        field,
+        eye,
+        direction,
+        accuracy=dr.opaque(Float, accuracy),
+        max_steps=dr.opaque(UInt32, max_steps),
+        stations=Stations(lengths, lane, stride, dr.opaque(UInt32, stops), lane, stride),
+        size=rays * stops,
+    )
+    dr.eval(records.position, records.direction)
+    d = dr.gather(types.Array3f, direction, dr.arange(UInt32, rays * stops) % stride)
+    offset = view.to_frame(d, types.Array3f(*records.position) - eye - d * lengths)
+    deflection = view.to_frame(d, types.Array3f(*records.direction) - d)
+    dr.eval(offset, deflection)
+    states = np.stack([np.asarray(part) for part in (*offset, *deflection)]).reshape(6, stops, rays)
+    lost = np.asarray(records.lost).reshape(stops, rays)[-1] > 0
+    steps = float(np.asarray(records.steps).reshape(stops, rays)[-1].sum(dtype=np.float64))
+    outside = np.asarray(records.outside).reshape(stops, rays)[-1] > 0
+    return Flown(states, outside, lost, steps, np.asarray(records.lowest).reshape(stops, rays)[-1])
