@@ -29,6 +29,7 @@ def check(scene: Scene, available: Callable[[], int | None]) -> None:
     _check_extent(scene)
     if scene.process == "convection":
         _check_flow(scene)
+        _check_turbulence(scene)
     elif scene.sources:
         raise InputError(
             "only air that moves by itself carries away what sources release",
@@ -51,6 +52,20 @@ def _check_flow(scene: Scene) -> None:
         scene.diffusivity.molecular,
         max(scene.time.duration, max(scene.film.times)),
         scene.sources,
+    )
+
+
+def _check_turbulence(scene: Scene) -> None:
+    """Warn of turbulence whose large eddies the flow makes, too."""
+    if scene.turbulence is None or scene.turbulence.largest is not None:
+        return
+    grid = scene.grid.build()
+    widest = max(grid.horizontal_step(axis) for axis in "xy" if getattr(grid, axis).size > 1)
+    warnings.warn(
+        "turbulence: the flow makes large eddies itself, and these are added once more; set "
+        f"turbulence.largest to what its cells cannot hold, 1 to 3 times their {widest:.3g} m",
+        NigemizuWarning,
+        stacklevel=4,
     )
 
 
