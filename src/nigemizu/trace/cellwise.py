@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
@@ -29,7 +30,7 @@ def lay_cellwise(
     view: View,
     segments: Segments,
     table: PathTable,
-    blocks: NDArray[np.intp],
+    parts: list[OpenGrid],
     *,
     accuracy: float,
     integration: float,
@@ -44,7 +45,8 @@ def lay_cellwise(
         As for `nigemizu.trace.refine.refine`.
     table : PathTable
         Of the other blocks.
-    blocks : (n,) int
+    parts : list of OpenGrid
+        The blocks, with what has been flown of them already.
 
     Returns
     -------
@@ -60,17 +62,16 @@ def lay_cellwise(
     """
     grid = next((g for g in _GRIDS if (g[0] + 1) * (g[1] + 1) <= _WORTH * rays), None)
     cells, base, error = table.cells.copy(), table.base.copy(), table.error.copy()
-    cells[blocks] = 0
-    error[blocks] = 0
-    if grid is None or not len(blocks):
-        return replace(table, cells=cells, error=error), blocks[:0]
+    for part in parts:
+        cells[part.blocks] = 0
+        error[part.blocks] = 0
+    if grid is None or not parts:
+        return replace(table, cells=cells, error=error), np.zeros(0, dtype=np.intp)
     kept, laid, size = [table.records], [], len(table.records) // RECORD
     flown, steps = table.flown, table.steps * table.flown
-    for first in range(0, len(blocks), _TOGETHER):
-        chosen = blocks[first : first + _TOGETHER]
-        round_ = fly_nodes(
-            field, view, segments, [OpenGrid(grid, chosen, None, (1, 1))], integration, max_steps
-        )
+    for part in _portions(parts, grid):
+        chosen = part.blocks
+        round_ = fly_nodes(field, view, segments, [part], integration, max_steps)
         flown, steps = flown + round_.rays, steps + round_.steps
         states = round_.states[0]
         wrong = _cell_errors(states, segments, chosen)
@@ -89,6 +90,13 @@ def lay_cellwise(
     return PathTable(np.concatenate(kept), base, cells, error, steps / max(flown, 1), flown), np.concatenate(
         laid
     )
+
+
+def _portions(parts: list[OpenGrid], grid: tuple[int, int]) -> Iterator[OpenGrid]:
+    """The blocks on the grid, not too many at a time."""
+    for part in parts:
+        for first in range(0, len(part.blocks), _TOGETHER):
+            yield part.part(slice(first, first + _TOGETHER)).refined(grid)
 
 
 def _cell_errors(states: Array, segments: Segments, blocks: NDArray[np.intp]) -> Array:

@@ -39,7 +39,7 @@ def refine(
     integration: float,
     max_steps: int,
     rays: float = np.inf,
-) -> PathTable:
+) -> tuple[PathTable, list[OpenGrid]]:
     """Fly the rays of the nodes, on finer and finer grids where the interpolation is not good enough.
 
     Parameters
@@ -54,6 +54,12 @@ def refine(
     rays : float
         Rays that will pass through each block: more nodes than a share of them are not worth it.
 
+    Returns
+    -------
+    PathTable
+    list of OpenGrid
+        The blocks that are not shared as a whole, with the nodes that have been flown.
+
     Notes
     -----
     Across and down by themselves: the nodes that the next coarser grid lacks are compared with the
@@ -66,6 +72,7 @@ def refine(
     """
     table = _Table(len(segments.count))
     flown, steps = 0, 0.0
+    given_up: list[OpenGrid] = []
     all_ = np.flatnonzero(~segments.lost)
     waiting = [OpenGrid(_FEWEST, all_, None, (1, 1))] if len(all_) else []
     while waiting:
@@ -80,6 +87,7 @@ def refine(
             ]
             coarse = [(w > _POLYNOMIAL * accuracy) & ~lost for w in wrong]
             good = np.flatnonzero(~coarse[0] & ~coarse[1] & ~lost)
+            rest = coarse[0] | coarse[1]
             worth = _nodes(part.grid, wrong, _POLYNOMIAL * accuracy) <= _WORTH * rays
             coarse = [c & worth for c in coarse]
             table.put(
@@ -88,8 +96,11 @@ def refine(
             for finer, factors, members in _doubled(part.grid, coarse, _MOST):
                 opened = OpenGrid(finer, blocks[members], states[..., members], factors)
                 next_.setdefault((finer, factors), []).append(opened)
+                rest[members] = False
+            if np.any(rest):
+                given_up.append(OpenGrid(part.grid, blocks[rest], states[..., rest], (1, 1)))
         waiting = [_merged(parts) for parts in next_.values()]
-    return table.frozen(steps, flown)
+    return table.frozen(steps, flown), given_up
 
 
 def _nodes(grid: tuple[int, int], wrong: list[FloatArray], accuracy: float) -> FloatArray:
@@ -101,12 +112,24 @@ def _nodes(grid: tuple[int, int], wrong: list[FloatArray], accuracy: float) -> F
 @final
 @dataclass(frozen=True)
 class OpenGrid:
-    """Blocks that need a finer grid, the states of the coarser one (None at first), and how much finer."""
+    """Blocks on a grid that is to be flown, the states of a coarser one (None at first), and how much finer
+    the grid is than that."""
 
     grid: tuple[int, int]
     blocks: NDArray[np.intp]
     states: Array | None
     factors: tuple[int, int]
+
+    def refined(self, grid: tuple[int, int]) -> OpenGrid:
+        """The same blocks on another grid; the states go with them where its nodes include theirs."""
+        factors = (grid[0] // self.grid[0], grid[1] // self.grid[1])
+        within = factors[0] * self.grid[0] == grid[0] and factors[1] * self.grid[1] == grid[1]
+        return OpenGrid(grid, self.blocks, self.states if within else None, factors if within else (1, 1))
+
+    def part(self, chosen: NDArray[np.intp] | slice) -> OpenGrid:
+        """Some of the blocks."""
+        states = None if self.states is None else self.states[..., chosen]
+        return OpenGrid(self.grid, self.blocks[chosen], states, self.factors)
 
 
 def _merged(parts: list[OpenGrid]) -> OpenGrid:
@@ -197,6 +220,9 @@ def fly_nodes(
     """Fly the nodes that the coarser grids lack, those of all parts together."""
     stops = segments.start.shape[1] + 1
     fresh = [_fresh(part) for part in parts]
+    if not any(mask.any() for mask in fresh):
+        known = [part.states for part in parts if part.states is not None]
+        return _Round(known, [np.zeros(len(part.blocks), dtype=bool) for part in parts], 0.0, 0)
     places = [_places(segments, part, mask) for part, mask in zip(parts, fresh, strict=True)]
     x, y = (np.concatenate([place[i] for place in places]) for i in (0, 1))
     lengths = np.concatenate([place[2] for place in places], axis=1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nigemizu.field import Bottomless, BoxedField, Field, Types
 from nigemizu.trace.cellwise import lay_cellwise
-from nigemizu.trace.refine import refine
+from nigemizu.trace.refine import OpenGrid, refine
 from nigemizu.trace.scout import BLOCK, Segments, scout
 from nigemizu.trace.shared import INTEGRATION, SharedPaths
 from nigemizu.trace.stations import fly_places
@@ -72,7 +72,7 @@ def share_paths(
         "max_steps": max_steps,
         "rays": rays * BLOCK[0] * BLOCK[1],
     }
-    table = refine(field, view, segments, **options)
+    table, rough = refine(field, view, segments, **options)
     test = partial(
         _wrong_blocks, field, view, segments, accuracy=accuracy, integration=integration,
         max_steps=max_steps, floor=floor,
@@ -80,8 +80,9 @@ def share_paths(
     types = types or field.types
     paths = SharedPaths(types, view, segments, table)
     wrong = test(table, paths, _doubtful(table, segments, accuracy))
-    rough = np.union1d(np.flatnonzero((table.cells[:, 0] == 0) & ~segments.lost), wrong)
-    if not len(rough):
+    if len(wrong):
+        rough.append(OpenGrid(BLOCK, wrong, None, (1, 1)))
+    if not rough:
         return paths
     table, laid = lay_cellwise(field, view, segments, table, rough, **options)
     paths = SharedPaths(types, view, segments, table)

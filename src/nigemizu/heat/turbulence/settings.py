@@ -78,7 +78,7 @@ class Turbulence(Value):
     exponent : float
         −4/3: free convection over hot ground. −2/3: wind without buoyancy. 0: the same at all heights.
     constant_below : float, m
-        Height below which the power law stops: C_T² stays there what it is at this height.
+        Height below which C_T² and the outer scale stay what they are at this height.
     inner_scale : float, m
         Inner scale l0 of the temperature: below it heat conduction smooths the eddies. Some millimetres
         next to the ground. Cells larger than this cut the spectrum at what they can hold.
@@ -190,7 +190,7 @@ class Turbulence(Value):
 
     def outer_scale_at(self, height: np.ndarray | float) -> np.ndarray:
         """Outer scale [m] at `height` [m]."""
-        height = np.asarray(height, dtype=np.float64)
+        height = np.maximum(np.asarray(height, dtype=np.float64), self.constant_below)
         scale = np.full_like(height, np.inf if self.outer_scale is None else self.outer_scale)
         if self.outer_scale_per_height is not None:
             scale = np.minimum(scale, self.outer_scale_per_height * height)
