@@ -22,6 +22,7 @@ __all__ = ["grounded", "share_paths"]
 _SHARING: Final = 0.7  # of the accuracy that sharing may use up
 _FAR: Final = 0.5  # of the median exit: blocks that are left sooner are not tested either
 _QUIET: Final = 0.02  # of the accuracy: blocks whose error is estimated smaller are not tested
+_PASSED: Final = 0.5  # of the accuracy, that the rays tested may be wrong by: others in the block are more so
 _TESTS: Final = (4, 512, 8192)  # rays in each of the others: at least, at most, and in all of them together
 _END_OF_GROUND: Final = 1e5  # m
 
@@ -134,7 +135,7 @@ def _wrong_blocks(
     displaced[~flown.outside & ~ends] = np.inf
     displaced[ends | ~shared] = 0
     displaced = displaced.reshape(tests, -1).max(axis=0)
-    return np.asarray(blocks[displaced > accuracy])
+    return np.asarray(blocks[displaced > _PASSED * accuracy])
 
 
 def _farthest(field: Field, view: View, boxes: NDArray[np.float64]) -> float:
