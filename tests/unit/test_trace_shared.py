@@ -227,3 +227,17 @@ def test_segments_contain_every_hit(seed: int) -> None:
     assert hits > 200
     covered_share = np.sum(np.where(used, end - start, 0), axis=1).mean() / 760
     assert covered_share < 0.6  # not simply everything
+
+
+@pytest.mark.parametrize("y0", np.linspace(2.4, 3.5, 9).round(3).tolist())
+def test_deep_objects_are_met_at_their_front(y0: float) -> None:
+    """A ray at a block's corner enters the box by its side, metres later than its neighbours by the front."""
+    air, view = hot_air(uneven=0.05), Film()
+    front = rectangle(180.0, y0, y0 + 3.0, 2.0)
+    boxes = np.array([[[180.0, y0, 0.0], [200.0, y0 + 3.0, 2.0]]])
+    paths = trace.share_paths(air, view, boxes, accuracy=ACCURACY, max_steps=20_000)
+    directions = directions_in(view, 4000)
+    shared, single = follow(paths, air, front, directions), march(air, view, front, directions)
+    edge = neighbours_differ(air, view, front, directions)
+    assert np.array_equal(np.array(shared.status)[~edge], np.array(single.status)[~edge])
+    assert np.sum(np.array(single.status) == trace.HIT) > 50

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any, Final, final
 
@@ -26,6 +27,7 @@ _DOWN: Final = 8  # rows of scouts in a block: where images fold, some between p
 _AHEAD: Final = 0.15  # of the spread of the corners' own contacts, by which a segment begins before them
 _LEAST_MARGIN: Final = 1e-4  # m
 _APART: Final = 1.5  # largest ratio of the corners' contacts of which that is enough
+_FLAT: Final = 1e-3  # m
 _MANY: Final = 1 << 30  # in place of the number of a box, where there are several
 
 
@@ -104,7 +106,7 @@ def scout(
     faces move linearly, widened by how far the bent paths stray from their chords, by half of its own
     width (for the rays between the scouts) and by the accuracy. The interval in which it overlaps an
     object's box is found in closed form.
-    Where there is one box only, which all four corners' rays meet, as on a flat ground, the segment begins
+    Where there is one flat box only, a ground, that all four corners' rays meet, the segment begins
     at each corner where its own ray comes near, a little earlier for what lies between them.
 
     Limits: a ray between the scouts that leaves the widened sweep, as in a fold of the image thinner than a
@@ -128,7 +130,7 @@ def scout(
     last = s[1:][exits]
     buried = ~_any_in_blocks(_with_neighbours(lit[-1:]), rows)[0]
     contacts = _contacts(field, view, boxes, records, offsets, columns, rows, s, accuracy)
-    start, end, count = _join(contacts, last)
+    start, end, count = _join(contacts, last, np.ptp(boxes, axis=1)[:, 2] < _FLAT)
     looks = np.any((contacts.end > last) & (contacts.end >= contacts.begin), axis=0) & ~buried
     return Segments(columns, rows, start, end, count, last, lost, looks, buried, x.size)
 
@@ -225,8 +227,8 @@ def _strips(types: Any, offsets: list[Any], stray: Any, columns: int, rows: int)
     extremes = []
     for offset in offsets:
         places = [dr.gather(Float, offset, i) for i in index]
-        extremes.append((_reduce(dr.minimum, places), _reduce(dr.maximum, places)))
-    strays = _reduce(dr.maximum, [dr.gather(Float, stray, i) for i in index])
+        extremes.append((functools.reduce(dr.minimum, places), functools.reduce(dr.maximum, places)))
+    strays = functools.reduce(dr.maximum, [dr.gather(Float, stray, i) for i in index])
     dr.eval(extremes, strays)
     return extremes, strays
 
@@ -350,17 +352,12 @@ def _negative(a0: Any, a1: Any) -> tuple[Any, Any]:
     return begin, end
 
 
-def _reduce(operation: Any, values: list[Any]) -> Any:
-    total = values[0]
-    for value in values[1:]:
-        total = operation(total, value)
-    return total
-
-
-def _join(contacts: _Contacts, last: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
+def _join(
+    contacts: _Contacts, last: FloatArray, flat: NDArray[np.bool_]
+) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
     """Join what lies in neighbouring intervals, and cut it where the rays are straight to their end.
 
-    Returns starts (B, M, 4), ends (B, M) and their number (B,).
+    `flat` tells the boxes that have no height. Returns starts (B, M, 4), ends (B, M) and their number (B,).
     """
     intervals, blocks = contacts.begin.shape
     start = np.repeat(last[:, None], MOST_SEGMENTS, axis=1)
@@ -388,10 +385,12 @@ def _join(contacts: _Contacts, last: FloatArray) -> tuple[FloatArray, FloatArray
         count[off] += 1
     most = max(1, int(count.max(initial=0)))
     start, stop, corner, box = start[:, :most], stop[:, :most], corner[:, :most], box[:, :most]
-    # The corners' own contacts where there is one box that all four of them meet.
+    # The corners' own contacts where there is one box that all four of them meet. It must be flat: others are
+    # entered by a side, too, and then later than rays between the corners enter by the front,
     earliest, latest = corner.min(axis=2), corner.max(axis=2)
-    # and where these are not too far apart for the plane through them: towards grazing they grow like 1/θ.
-    own = (box != _MANY) & np.isfinite(latest) & (latest <= _APART * earliest)
+    # and these not too far apart for the plane through them: towards grazing they grow like 1/θ.
+    single = np.append(flat, False)[np.minimum(box, len(flat))]
+    own = single & np.isfinite(latest) & (latest <= _APART * earliest)
     with np.errstate(invalid="ignore"):
         ahead = np.maximum(corner - _AHEAD * (latest - earliest)[..., None], start[..., None])
     return np.where(own[..., None], ahead, start[..., None]), stop, count

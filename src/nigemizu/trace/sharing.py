@@ -23,6 +23,7 @@ _SHARING: Final = 0.7  # of the accuracy that sharing may use up
 _FAR: Final = 0.5  # of the median exit: blocks that are left sooner are not tested either
 _QUIET: Final = 0.02  # of the accuracy: blocks whose error is estimated smaller are not tested
 _PASSED: Final = 0.5  # of the accuracy, that the rays tested may be wrong by: others in the block are more so
+_PASSED_CELLWISE: Final = 1.0  # the same where what is not smooth has been marked
 _TESTS: Final = (4, 512, 8192)  # rays in each of the others: at least, at most, and in all of them together
 _END_OF_GROUND: Final = 1e5  # m
 
@@ -75,19 +76,18 @@ def share_paths(
     }
     table, rough = refine(field, view, segments, **options)
     test = partial(
-        _wrong_blocks, field, view, segments, accuracy=accuracy, integration=integration,
-        max_steps=max_steps, floor=floor,
+        _wrong_blocks, field, view, segments, integration=integration, max_steps=max_steps, floor=floor
     )  # fmt: skip
     types = types or field.types
     paths = SharedPaths(types, view, segments, table)
-    wrong = test(table, paths, _doubtful(table, segments, accuracy))
+    wrong = test(table, paths, _doubtful(table, segments, accuracy), passed=_PASSED * accuracy)
     if len(wrong):
         rough.append(OpenGrid(BLOCK, wrong, None, (1, 1)))
     if not rough:
         return paths
     table, laid = lay_cellwise(field, view, segments, table, rough, **options)
     paths = SharedPaths(types, view, segments, table)
-    paths.withdraw(test(table, paths, laid))
+    paths.withdraw(test(table, paths, laid, passed=_PASSED_CELLWISE * accuracy))
     return paths
 
 
@@ -105,13 +105,13 @@ def _wrong_blocks(
     paths: SharedPaths,
     blocks: NDArray[np.intp],
     *,
-    accuracy: float,
+    passed: float,
     integration: float,
     max_steps: int,
     floor: float,
 ) -> NDArray[np.intp]:
-    """Those of the blocks in which a few rays between the nodes, flown for the purpose, differ too much from
-    the table.
+    """Those of the blocks in which a few rays between the nodes, flown for the purpose, differ from the
+    table by more than `passed` [rad].
 
     What the grids' own comparison cannot see: a kink between two nodes.
     """
@@ -135,7 +135,7 @@ def _wrong_blocks(
     displaced[~flown.outside & ~ends] = np.inf
     displaced[ends | ~shared] = 0
     displaced = displaced.reshape(tests, -1).max(axis=0)
-    return np.asarray(blocks[displaced > _PASSED * accuracy])
+    return np.asarray(blocks[displaced > passed])
 
 
 def _farthest(field: Field, view: View, boxes: NDArray[np.float64]) -> float:
