@@ -206,19 +206,20 @@ class SharedPaths:
         shared = active & (dr.gather(self.types.UInt32, self._cells[0], place.block, active) > 0)
         if self.everywhere:
             return shared
-        record, _, _ = self._node(place, 0, shared)
+        record, *_ = self._node(place, 0, shared)
         torn = dr.gather(self.types.Array4f, self._records, record * 2, shared)[3] > 0
         return shared & ~torn
 
-    def _node(self, place: _Place, segment: Any, active: Any) -> tuple[Any, Any, Any]:
-        """Record of the node to the upper left of rays, and where in the cell behind it they lie."""
+    def _node(self, place: _Place, segment: Any, active: Any) -> tuple[Any, Any, Any, Any]:
+        """Records of the nodes to the upper and lower left of rays, and where in the cell they lie."""
         UInt32, Float = self.types.UInt32, self.types.Float
         across, down = (dr.maximum(dr.gather(UInt32, cells, place.block, active), 1) for cells in self._cells)
         x, y = place.x * Float(across), place.y * Float(down)
         i = UInt32(dr.clip(x, 0, Float(across - 1)))
         j = UInt32(dr.clip(y, 0, Float(down - 1)))
         base = dr.gather(UInt32, self._base, place.block, active)
-        return base + (segment * (down + 1) + j) * (across + 1) + i, x - Float(i), y - Float(j)
+        upper = base + (segment * (down + 1) + j) * (across + 1) + i
+        return upper, upper + across + 1, x - Float(i), y - Float(j)
 
     def _find(self, direction: Any) -> _Place:
         UInt32, Float = self.types.UInt32, self.types.Float
@@ -239,9 +240,8 @@ class SharedPaths:
 
     def _interpolated(self, place: _Place, segment: Any, active: Any) -> tuple[Any, Any]:
         """Offset and deflection at the beginning of a segment, between the four nearest nodes."""
-        row, u, v = self._node(place, segment, active)
-        across = dr.maximum(dr.gather(self.types.UInt32, self._cells[0], place.block, active), 1)
-        near, far = self._pair(row, u, active), self._pair(row + across + 1, u, active)
+        upper, lower, u, v = self._node(place, segment, active)
+        near, far = self._pair(upper, u, active), self._pair(lower, u, active)
         offset, deflection = (dr.lerp(a, b, v) for a, b in zip(near, far, strict=True))
         return offset, deflection
 

@@ -80,14 +80,14 @@ def share_paths(
     )  # fmt: skip
     types = types or field.types
     paths = SharedPaths(types, view, segments, table)
-    wrong = test(table, paths, _doubtful(table, segments, accuracy), passed=_PASSED * accuracy)
+    wrong = test(paths, _doubtful(table, segments, accuracy), passed=_PASSED * accuracy)
     if len(wrong):
         rough.append(OpenGrid(BLOCK, wrong, None, (1, 1)))
     if not rough:
         return paths
     table, laid = lay_cellwise(field, view, segments, table, rough, **options)
     paths = SharedPaths(types, view, segments, table)
-    paths.withdraw(test(table, paths, laid, passed=_PASSED_CELLWISE * accuracy))
+    paths.withdraw(test(paths, laid, passed=_PASSED_CELLWISE * accuracy))
     return paths
 
 
@@ -101,7 +101,6 @@ def _wrong_blocks(
     field: Field,
     view: View,
     segments: Segments,
-    table: PathTable,
     paths: SharedPaths,
     blocks: NDArray[np.intp],
     *,
