@@ -215,6 +215,32 @@ def test_a_thin_layer_is_not_stepped_through(medium: str, before: float, turn: f
     assert np.all(flown.position[2] > 0.5)  # it did turn
 
 
+def test_rays_that_dip_into_a_steep_cell_do_not_leap_out_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The slope at the top of a thick cell says little of that where a ray turns within it.
+
+    Bound: the accuracy that was asked for, against the same rays a hundred thousand times as accurate.
+    """
+    z = np.array(
+        [0, 0.01, 0.032, 0.059, 0.092, 0.131, 0.18, 0.24, 0.31, 0.4, 0.5, 0.63, 0.78, 0.97, 1.2, 1.5]
+    )
+    n = 2.6e-4 - 2e-5 * np.exp(-z / 0.1)
+    wide = [-1e5, 1e5]
+    air = field.StratifiedVolume(wide, wide, z, np.broadcast_to(n[:, None, None], (16, 2, 2)), TYPES)
+    elevation = -np.linspace(0.5e-3, 6e-3, 2000)
+    ahead = TYPES.Array3f(TYPES.Float(np.cos(elevation)), 0, TYPES.Float(np.sin(elevation)))
+
+    def heights(accuracy: float) -> FloatArray:
+        eye = TYPES.Array3f(0, 0, 1.4)
+        end = trace.march(air, eye, ahead, accuracy=accuracy, max_steps=20_000, max_distance=1500.0)
+        return np.asarray(end.position, dtype=np.float64)[2]
+
+    exact = heights(1e-11)
+    for accuracy in (1e-4, 1e-5, 1e-6):
+        assert np.abs(heights(accuracy) - exact).max() / 1500 < accuracy
+    monkeypatch.setattr("nigemizu.trace.controlled._ASTRAY", 1e9)
+    assert np.abs(heights(1e-5) - exact).max() / 1500 > 20e-5  # measured: 66 times the accuracy
+
+
 def test_flat_cells_are_crossed_in_one_go() -> None:
     """Where rays may turn by 1e-6 otherwise on the whole way, fewer than half the steps suffice."""
     launch = grazing(1.5, 0.01)

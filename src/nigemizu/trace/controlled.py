@@ -18,6 +18,7 @@ _GROWTH, _SHRINKAGE, _CAUTION = 5.0, 0.1, 0.85  # of the step, from one to the n
 _BEND_IN_CELL: Final = 0.25  # of a cell's width, that a step may stray sideways from its straight line
 _CHORD_SLACK: Final = 1.2  # that a step's chord may stray more than foreseen
 _OVERSHOOT: Final = 1 + 1e-5  # relative, so that a step ends beyond the face and not just before it
+_ASTRAY: Final = 0.05  # of a cell's height, that a step may end above or below the cell
 _ULPS: Final = 64  # a step is never shorter than so many spacings of the coordinates' numbers
 _TINY: Final = 1e-20  # in place of zero, where it divides
 _FARTHEST: Final = 1e30  # m; in place of infinity, whose products may not be numbers
@@ -103,6 +104,10 @@ class ControlledSteps(StepRule):
             strays = self._strays(flight, tried)
             passes &= strays <= 1
             factor = dr.select(strays <= 1, factor, dr.minimum(factor, _CAUTION * dr.rsqrt(strays)))
+        if cell.lower is not None and cell.upper is not None:
+            astray = self._ends_astray(cell, tried.position.z)
+            passes &= ~astray
+            factor = dr.select(astray, dr.minimum(factor, 0.5), factor)
         passes |= h <= least
         cut = passes & (h < flight.trial) & (factor >= 1)
         trial = dr.select(cut, dr.maximum(h * factor, flight.trial), h * factor)
@@ -128,6 +133,15 @@ class ControlledSteps(StepRule):
         if self.chord_tolerance is not None:
             allowed = dr.minimum(allowed, self._chord_room(flight, k0))
         return allowed
+
+    @staticmethod
+    def _ends_astray(cell: Cell, height: Any) -> Any:
+        """Whether a step ended far beyond the cell, where its formula does not hold.
+
+        A ray that dips into steeper layers comes up again sooner than the parabola from its first slope.
+        """
+        beyond = dr.maximum(height - cell.upper.z, cell.lower.z - height)
+        return beyond > _ASTRAY * (cell.upper.z - cell.lower.z)
 
     def _chord_room(self, flight: Flight, k0: Any) -> Any:
         """Interval h after which the chord lies within the tolerance still, if the ray turns as it does here.
