@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nigemizu.field.axis import Span
-from nigemizu.field.splines import column_slopes
+from nigemizu.field.splines import column_slopes, upper_powers
 from nigemizu.field.types import Types
 
 __all__ = ["Background", "Line", "Piece", "Polynomials", "chord_pieces", "merged_pieces", "spline_pieces"]
@@ -170,7 +170,7 @@ def spline_pieces(z: NDArray[np.float64], means: NDArray[np.float64]) -> NDArray
     """
     widths, rise, slopes = np.diff(z), np.diff(means), column_slopes(z, means)
     begin, end = widths * slopes[:-1], widths * slopes[1:]
-    return np.column_stack([means[:-1], begin, 3 * rise - 2 * begin - end, begin + end - 2 * rise])
+    return np.column_stack([means[:-1], begin, *upper_powers(rise, begin, end)])
 
 
 def chord_pieces(means: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -209,7 +209,7 @@ def merged_pieces(
     def hermite(first: int, last: int) -> NDArray[np.float64]:
         length, rise = z[last] - z[first], values[last] - values[first]
         begin, end = length * end_slopes[first], length * end_slopes[last]
-        return np.array([values[first], begin, 3 * rise - 2 * begin - end, begin + end - 2 * rise])
+        return np.array([values[first], begin, *upper_powers(rise, begin, end)])
 
     def error(first: int, last: int) -> float:
         _, c1, c2, c3 = hermite(first, last)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nigemizu.field.axis import Axis, Span
+from nigemizu.field.splines import upper_powers
 from nigemizu.field.types import Types
 
 __all__ = ["QuietBlocks", "find_quiet"]
@@ -193,8 +194,7 @@ def _slope_range(values: NDArray[Any], slopes: NDArray[Any], h: NDArray[Any]) ->
 
 def _powers(values: NDArray[Any], slopes: NDArray[Any], h: NDArray[Any]) -> tuple[Any, Any]:
     """Coefficients of the second and third power of the fraction of each cell."""
-    rise, begin, end = np.diff(values, axis=0), h * slopes[:-1], h * slopes[1:]
-    return 3 * rise - 2 * begin - end, begin + end - 2 * rise
+    return upper_powers(np.diff(values, axis=0), h * slopes[:-1], h * slopes[1:])
 
 
 def _across(

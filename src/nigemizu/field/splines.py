@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["column_slopes"]
+__all__ = ["column_slopes", "upper_powers"]
 
 FloatArray = NDArray[np.float64]
 
@@ -15,6 +15,20 @@ _STEEPEST: Final = 2.0  # times the flatter of the two chords that meet at a nod
 _FLATTEST: Final = 0.5
 _CURVED: Final = 1.5  # times the slope that parabolas give there, for the top of a smooth hill
 _AT_ENDS: Final = 3.0  # times the last chord
+
+
+def upper_powers(rise: Any, begin: Any, end: Any) -> tuple[Any, Any]:
+    """Coefficients of the second and third power of Hermite's cubic over a cell, by the fraction of it.
+
+    Parameters
+    ----------
+    rise : array, 1
+        By how much the value at the end exceeds that at the beginning.
+    begin, end : array, 1
+        Derivatives there, times the length of the cell.
+    """
+    third = (begin + end) - 2 * rise
+    return rise - (begin + third), third
 
 
 def column_slopes(z: FloatArray, values: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from nigemizu.field.axis import Span
 from nigemizu.field.background import Polynomials, spline_pieces
 from nigemizu.field.cell import Cell
 from nigemizu.field.quiet import QuietBlocks, find_quiet
-from nigemizu.field.splines import column_slopes
+from nigemizu.field.splines import column_slopes, upper_powers
 from nigemizu.field.types import Precision, Types, aligned_zeros
 from nigemizu.field.voxels import Beyond, VoxelField, horizontal_means, read_mesh
 
@@ -198,9 +198,8 @@ class StratifiedVolume(VoxelField):
         powers: list[list[Any]] = [[], [], [], []]
         below, above = (self._bilinear(layer, active) for layer in (corner, corner + self._layer))
         for (value, slope), (value_above, slope_above) in zip(below, above, strict=True):
-            rise, c1, end = value_above - value, slope * height, slope_above * height
-            c3 = (c1 + end) - 2 * rise
-            c2 = rise - (c1 + c3)
+            c1 = slope * height
+            c2, c3 = upper_powers(value_above - value, c1, slope_above * height)
             for power, coefficient in zip(powers, (value, c1, c2, c3), strict=True):
                 power.append(coefficient)
         return powers

@@ -76,13 +76,14 @@ def displacement_figure(
         picture = panels[0].imshow(encoded(radiance), interpolation="none")
         panels[0].set_title("the picture")
         # room for a scale that is not there: all panels become equally large
-        scale = figure.colorbar(picture, ax=panels[0], **_SCALE)
-        scale.ax.axis("off")
-        for artist in scale.ax.get_children():
+        unused = figure.colorbar(picture, ax=panels[0], **_SCALE)
+        unused.ax.axis("off")
+        for artist in unused.ax.get_children():
             artist.set_alpha(0.0)
-        spread = _span(np.hypot(x, y))
+        length = np.hypot(x, y)
+        spread = _span(length)
         for axes, values, name, colours, lowest in (
-            (panels[1], np.hypot(x, y), "displacement", "inferno", 0.0),
+            (panels[1], length, "displacement", "inferno", 0.0),
             (panels[2], x, "to the right", "RdBu_r", -spread),
             (panels[3], y, "down", "RdBu_r", -spread),
         ):

@@ -152,12 +152,15 @@ def _job(scene: Scene, folder: FrameFolder, index: int, air: _Air, truths: Path 
 
 def _take(studio: Studio, job: _Job, progress: ProgressMeter) -> _Outcome:
     """Render a frame; it is written last, so that one that is there is complete."""
+    import drjit
+
     index, air, frame, truth = job
     picture = studio.shoot(air, frame=index, progress=progress)
     if truth is not None:
         stem, time = truth
         studio.truth(picture, air, time, frame=index).save(stem)
     picture.save(frame)
+    drjit.flush_malloc_cache()  # arrays of other sizes follow; kept, those of a long film would add up
     return picture.statuses, picture.report
 
 
