@@ -75,8 +75,15 @@ def share_paths(
         "rays": rays * BLOCK[0] * BLOCK[1],
     }
     table, rough = refine(field, view, segments, **options)
-    control: dict[str, Any] = {"integration": integration, "max_steps": max_steps, "floor": floor}
-    test = partial(_wrong_blocks, field, view, segments, **control)
+    test = partial(
+        _wrong_blocks,
+        field,
+        view,
+        segments,
+        integration=integration,
+        max_steps=max_steps,
+        floor=floor,
+    )
     types = types or field.types
     paths = SharedPaths(types, view, segments, table)
     wrong = test(paths, _doubtful(table, segments, accuracy), passed=_PASSED * accuracy)
