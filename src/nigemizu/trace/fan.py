@@ -165,7 +165,7 @@ class Setting:
         layer = eye - 1 - np.argmax(turned[:, ::-1], axis=1)
         low = np.where(falls, np.take_along_axis(shells.heights, layer, axis=0), at_eye)
         high = np.where(falls, np.take_along_axis(shells.heights, layer + 1, axis=0), at_eye)
-        target = np.where(falls, 0.5 * np.log1p(-(np.sin(elevation[:, None]) ** 2)), 0.0)
+        target = 0.5 * np.log1p(-(np.where(falls, np.sin(elevation[:, None]), 0.0) ** 2))
         bottom = np.where(falls, np.take_along_axis(shells.climbs, layer, axis=0), 0.0)
         there = self.air.state(at_eye[:1])[0]
         found, _, _ = solve_climb(self.air, np.maximum(target, bottom), at_eye[:1], there, low, high)

@@ -18,6 +18,16 @@ DUCT: Final = 0.05
 """Layers in which 1 + (r/n) dn/dr falls below this are integrated over the height instead of the angle."""
 
 _SAMPLES: Final = 33
+_PLACES: Final = -np.cos(np.linspace(0.0, np.pi, _SAMPLES))  # on [−1, 1]
+_INTEGRAL: Final = np.polynomial.chebyshev.chebvander(_PLACES, _SAMPLES) @ np.polynomial.chebyshev.chebint(
+    np.linalg.inv(np.polynomial.chebyshev.chebvander(_PLACES, _SAMPLES - 1)), lbnd=-1, axis=0
+)
+"""(33, 33): from values on the places to the integrals of their polynomial from −1 to the places."""
+
+_FINEST: Final = 1e-13  # by which n may differ from the integral of its slope
+_CLOSE: Final = 1e-6  # the same in terms of the change of n in the layer
+_THINNEST: Final = 1e-4  # m; of layers
+_MOST_LAYERS: Final = 5000
 _JUMP: Final = 1e-10  # of n at a break: a horizontal ray turns by √(2e-10) there
 
 
@@ -100,16 +110,12 @@ def arranged(air: SphericalAir, eye: float, *, ground: float, top: float, breaks
         The index is not finite, jumps at a break, or its derivative is not that of the index.
     """
     inner = breaks[(breaks > ground) & (breaks < top)]
-    levels = np.unique(np.concatenate([[ground, eye, top], inner]))
-    samples = _between(levels)
-    excess, slope = air.state(samples[..., None])
-    _check_samples(samples, excess, slope)
+    cuts = np.unique(np.concatenate([[ground, eye, top], inner]))
+    levels, samples, excess, slope = _resolved(air, cuts)
     rates = air.rate(samples[..., None], excess, slope) * (air.radius + samples[..., None])
     ducted = rates.min(axis=(1, 2)) < DUCT
-    if not np.any(ducted):
-        heights = np.repeat(levels[:, None], excess.shape[-1], axis=1)
-        flags = ducted
-    else:
+    heights, flags = np.repeat(levels[:, None], excess.shape[-1], axis=1), ducted
+    if np.any(ducted):
         heights, flags = _with_stationary(air, levels, samples, rates, ducted)
     at_eye = np.full((1, heights.shape[1]), eye)
     climbs = air.climb(heights, air.state(heights)[0], at_eye, air.state(at_eye)[0])
@@ -117,15 +123,45 @@ def arranged(air: SphericalAir, eye: float, *, ground: float, top: float, breaks
     return Shells(heights, climbs, flags, place)
 
 
-def _between(levels: FloatArray) -> FloatArray:
-    """Sample heights (L − 1, 33) just inside each pair of levels, denser towards both."""
-    low, high = levels[:-1, None], levels[1:, None]
+def _resolved(air: SphericalAir, cuts: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Levels (L,), with as many added to the cuts as it takes for samples to know n and dn/dh between them.
+
+    Also the samples (L − 1, 33), and n − 1 and dn/dh there (L − 1, 33, K). Wherever the integral of the
+    polynomial through the samples of dn/dh does not give the samples of n, a layer is halved.
+    """
+    low, high = cuts[:-1], cuts[1:]
+    kept = []
+    count = len(low)
+    while len(low):
+        samples = _between(low, high)
+        excess, slope = air.state(samples[..., None])
+        _check_finite(samples, excess, slope)
+        reach = 0.5 * (samples[:, -1] - samples[:, 0])
+        foretold = reach[:, None, None] * np.einsum("ij,ljk->lik", _INTEGRAL, slope)
+        amount = reach[:, None] * np.abs(slope).mean(axis=1) * 2.0
+        apart = np.abs(excess - excess[:, :1] - foretold).max(axis=1)
+        coarse = np.any(apart > _FINEST + _CLOSE * amount, axis=1)
+        kept += list(zip(low[~coarse], samples[~coarse], excess[~coarse], slope[~coarse], strict=True))
+        count += int(coarse.sum())
+        low, high = low[coarse], high[coarse]
+        if count > _MOST_LAYERS or np.any(high - low < _THINNEST):
+            _refuse_slope(low, high, apart[coarse].max(axis=1))
+        middle = 0.5 * (low + high)
+        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
+    kept.sort(key=lambda layer: float(layer[0]))
+    starts, samples, excess, slope = (np.array(part) for part in zip(*kept, strict=True))
+    _check_joints(samples, excess, slope)
+    return np.append(starts, cuts[-1]), samples, excess, slope
+
+
+def _between(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Sample heights (L, 33) just inside each pair of levels, denser towards both."""
     inset = 1e-9 * (high - low) + 4.0 * np.spacing(np.maximum(np.abs(low), np.abs(high)))
-    part = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _SAMPLES))
-    return np.asarray(low + inset + (high - low - 2.0 * inset) * part)
+    part = 0.5 + 0.5 * _PLACES
+    return np.asarray((low + inset)[:, None] + (high - low - 2.0 * inset)[:, None] * part)
 
 
-def _check_samples(samples: FloatArray, excess: FloatArray, slope: FloatArray) -> None:
+def _check_finite(samples: FloatArray, excess: FloatArray, slope: FloatArray) -> None:
     good = np.isfinite(excess) & np.isfinite(slope) & (excess > -1.0)
     if not np.all(good):
         where = np.argwhere(~good)[0]
@@ -135,6 +171,9 @@ def _check_samples(samples: FloatArray, excess: FloatArray, slope: FloatArray) -
             value=float(excess[tuple(where)]),
             expected="n - 1 and dn/dh at every height from the ground to the top",
         )
+
+
+def _check_joints(samples: FloatArray, excess: FloatArray, slope: FloatArray) -> None:
     gaps = samples[1:, 0] - samples[:-1, -1]
     reach = gaps[:, None] * (np.abs(slope[1:, 0]) + np.abs(slope[:-1, -1]))
     jumps = np.abs(excess[1:, 0] - excess[:-1, -1]) - reach
@@ -147,22 +186,17 @@ def _check_samples(samples: FloatArray, excess: FloatArray, slope: FloatArray) -
             expected="a continuous index, whose slope alone may jump",
             remedy="join the layers, or spread the jump over a few centimetres",
         )
-    steps = np.diff(samples, axis=1)[..., None]
-    means = 0.5 * (slope[:, 1:] + slope[:, :-1])
-    foretold, amount = (steps * means).sum(axis=1), (steps * np.abs(means)).sum(axis=1)
-    found = excess[:, -1] - excess[:, 0]
-    clear = (np.abs(foretold) > 0.5 * amount) & (amount > _JUMP)
-    wrong = clear & ~((found / np.where(clear, foretold, 1.0) > 0.2) & (np.abs(found) < 5.0 * amount))
-    wrong |= np.abs(found) > 5.0 * amount + _JUMP
-    if np.any(wrong):
-        layer = int(np.argwhere(wrong)[0][0])
-        raise InputError(
-            f"dn/dh does not add up to the change of n between {samples[layer, 0]:g} "
-            f"and {samples[layer, -1]:g} m",
-            key="index",
-            expected="dn/dh per metre, negative where n falls with height",
-            remedy="give the heights at which dn/dh jumps as breaks",
-        )
+
+
+def _refuse_slope(low: FloatArray, high: FloatArray, apart: FloatArray) -> None:
+    worst = int(np.argmax(apart))
+    raise InputError(
+        f"dn/dh does not add up to the change of n between {low[worst]:g} and {high[worst]:g} m",
+        key="index",
+        value=float(apart[worst]),
+        expected="the derivative of n - 1 by the height in metres, and a continuous n",
+        remedy="give the heights at which dn/dh jumps as breaks",
+    )
 
 
 def _with_stationary(
