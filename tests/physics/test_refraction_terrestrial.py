@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 from nigemizu import trace
 from nigemizu.air import refractivity
@@ -212,3 +213,63 @@ def test_lengths_of_rays_in_closed_form() -> None:
     np.testing.assert_allclose(rays.path_length + rays.excess_path, optical, rtol=1e-9, atol=0)
     assert rays.lowest[4] == pytest.approx(size[4] - R, rel=1e-9, abs=0)  # θ = 0: r = A
     assert rays.lowest[:4].tolist() == [eye] * 4
+
+
+def inversion(height: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """An exponential atmosphere with a smooth, ducting step of n around 60 m."""
+    excess = 2.8e-4 * np.exp(-height / 8e3)
+    step = np.tanh((height - 60.0) / 5.0)
+    return excess - 3e-6 * (1 + step), -excess / 8e3 - 6e-7 * (1 - step**2)
+
+
+def test_a_smooth_duct_against_the_differential_equation() -> None:
+    """Rays along the arc s by SciPy: dh = sin θ ds, dθ = cos θ (1/r + n'/n) ds, dR = −cos θ n'/n ds.
+
+    No breaks are given, and the air is 5 km high: the duct of a few metres must be found.
+    """
+
+    def change(_: float, y: FloatArray) -> list[FloatArray]:
+        excess, slope = inversion(y[0])
+        pull = slope / (1 + excess)
+        level = np.cos(y[1])
+        return [np.sin(y[1]), level * (1 / (R + y[0]) + pull), -level * pull, level / (R + y[0]), excess]
+
+    def out(_: float, y: FloatArray) -> float:
+        return float(y[0] - 5000.0)
+
+    out.terminal = True  # type: ignore[attr-defined]
+    elevations = np.array([-0.0021, -0.001, 0.0, 0.0004, 0.003])
+    for eye in (20.0, 75.0):
+        rays = trace.refracted_rays(
+            inversion, elevations, radius=R, observer_height=eye, top=5e3, tolerance=1e-12
+        )
+        assert (rays.status == trace.RefractionStatus.ESCAPED).sum() >= (1 if eye < 60 else 4)
+        for number in np.flatnonzero(rays.status == trace.RefractionStatus.ESCAPED):
+            path = solve_ivp(
+                change,
+                (0, 1e6),
+                [eye, elevations[number], 0, 0, 0],
+                method="DOP853",
+                rtol=1e-13,
+                atol=[1e-9, 1e-15, 1e-15, 1e-15, 1e-12],
+                events=out,
+            )
+            lifted, angle, excess_path = path.y_events[0][0][2:]
+            assert rays.refraction[number] == pytest.approx(lifted, rel=0, abs=1e-9)
+            assert rays.geocentric_angle[number] == pytest.approx(angle, rel=0, abs=1e-9)
+            assert rays.path_length[number] == pytest.approx(path.t_events[0][0], rel=0, abs=1e-2)
+            assert rays.excess_path[number] == pytest.approx(excess_path, rel=0, abs=1e-5)
+
+
+def test_what_no_break_tells_is_found() -> None:
+    """The same rays whether or not the kinks and steps of an index are given as breaks."""
+    elevations = np.array([-0.0021, -0.0008, 0.0, 2e-4, 0.001, 0.01, 0.3])
+    kinked = PowerLaws([-2.0, 0.5, 3.0, 0.15], [0.0, 1.5, 40.0, 50.0])
+    for index, cuts in ((kinked, kinked.breaks), (inversion, np.linspace(20, 100, 41))):
+        for eye in (5.0, 75.0):
+            told, untold = (
+                trace.refracted_rays(index, elevations, radius=R, observer_height=eye, top=TOP, breaks=given)
+                for given in (cuts, ())
+            )
+            np.testing.assert_array_equal(told.status, untold.status)
+            np.testing.assert_allclose(told.refraction, untold.refraction, rtol=0, atol=3e-9)

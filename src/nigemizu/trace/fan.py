@@ -19,7 +19,8 @@ __all__ = ["Fan", "Setting", "wave_shape"]
 FloatArray: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
 
-_MOST: Final = 150_000  # numbers in one array
+_MOST: Final = 150_000  # numbers in an array that is worked on
+_MOST_SQUARES: Final = 4_000_000  # numbers in an array that is kept
 _STEEP: Final = 2.0
 """Shells in which sin² of the elevation grows by less than this factor are integrated over the height."""
 
@@ -112,7 +113,7 @@ class Setting:
     def fan(self, elevation: FloatArray, measures: Sequence[Measure]) -> Fan:
         """What rays of apparent elevations (N,) [rad] sum up."""
         levels, count = self.shells.heights.shape
-        length = max(1, _MOST // (count * max(15, levels)))
+        length = max(1, min(_MOST // (15 * count), _MOST_SQUARES // (levels * count)))
         parts = [
             self._part(elevation[begin : begin + length], measures)
             for begin in range(0, max(1, len(elevation)), length)

@@ -26,7 +26,7 @@ _INTEGRAL: Final = np.polynomial.chebyshev.chebvander(_PLACES, _SAMPLES) @ np.po
 
 _FINEST: Final = 1e-13  # by which n may differ from the integral of its slope
 _CLOSE: Final = 1e-6  # the same in terms of the change of n in the layer
-_THINNEST: Final = 1e-4  # m; of layers
+_THINNEST: Final = 1e-4  # m; layers that are halved no more
 _MOST_LAYERS: Final = 5000
 _JUMP: Final = 1e-10  # of n at a break: a horizontal ray turns by √(2e-10) there
 
@@ -140,17 +140,18 @@ def _resolved(air: SphericalAir, cuts: FloatArray) -> tuple[FloatArray, FloatArr
         foretold = reach[:, None, None] * np.einsum("ij,ljk->lik", _INTEGRAL, slope)
         amount = reach[:, None] * np.abs(slope).mean(axis=1) * 2.0
         apart = np.abs(excess - excess[:, :1] - foretold).max(axis=1)
-        coarse = np.any(apart > _FINEST + _CLOSE * amount, axis=1)
+        thin = (high - low < _THINNEST)[:, None]
+        coarse = np.any(apart > np.where(thin, _JUMP, _FINEST + _CLOSE * amount), axis=1)
         kept += list(zip(low[~coarse], samples[~coarse], excess[~coarse], slope[~coarse], strict=True))
         count += int(coarse.sum())
         low, high = low[coarse], high[coarse]
-        if count > _MOST_LAYERS or np.any(high - low < _THINNEST):
+        if count > _MOST_LAYERS or np.any(thin[coarse]):
             _refuse_slope(low, high, apart[coarse].max(axis=1))
         middle = 0.5 * (low + high)
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
     kept.sort(key=lambda layer: float(layer[0]))
     starts, samples, excess, slope = (np.array(part) for part in zip(*kept, strict=True))
-    _check_joints(samples, excess, slope)
+    _check_joints(starts, samples, excess, slope)
     return np.append(starts, cuts[-1]), samples, excess, slope
 
 
@@ -173,14 +174,14 @@ def _check_finite(samples: FloatArray, excess: FloatArray, slope: FloatArray) ->
         )
 
 
-def _check_joints(samples: FloatArray, excess: FloatArray, slope: FloatArray) -> None:
+def _check_joints(starts: FloatArray, samples: FloatArray, excess: FloatArray, slope: FloatArray) -> None:
     gaps = samples[1:, 0] - samples[:-1, -1]
     reach = gaps[:, None] * (np.abs(slope[1:, 0]) + np.abs(slope[:-1, -1]))
     jumps = np.abs(excess[1:, 0] - excess[:-1, -1]) - reach
     if jumps.size and jumps.max() > _JUMP:
         layer = int(np.argmax(jumps.max(axis=-1)))
         raise InputError(
-            f"the index jumps at the height {samples[layer + 1, 0]:g} m",
+            f"the index jumps at the height {starts[layer + 1]:g} m",
             key="index",
             value=float(jumps[layer].max()),
             expected="a continuous index, whose slope alone may jump",
