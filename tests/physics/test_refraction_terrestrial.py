@@ -261,6 +261,28 @@ def test_a_smooth_duct_against_the_differential_equation() -> None:
             assert rays.excess_path[number] == pytest.approx(excess_path, rel=0, abs=1e-5)
 
 
+def test_wavelengths_that_a_duct_parts() -> None:
+    """Some wavelengths turn in the duct, others pass through it: each as if it were alone."""
+    shares = np.array([0.1, 0.2, 0.21, 0.5, 1.0])  # of the step of n, of which 0.204 makes a duct
+
+    def coloured(height: FloatArray, share: FloatArray = shares) -> tuple[FloatArray, FloatArray]:
+        with_step, slope = inversion(height)
+        plain = 2.8e-4 * np.exp(-height / 8e3)
+        return plain + share * (with_step - plain), -plain / 8e3 + share * (slope + plain / 8e3)
+
+    elevations = np.array([-0.002, -0.001, -5e-4, -1e-4, 0.0, 2e-4, 6e-4, 0.002])
+    for eye in (10.0, 58.0, 64.0, 90.0):
+        given = {"radius": R, "observer_height": eye, "top": TOP, "tolerance": 1e-11}
+        together = trace.refracted_rays(coloured, elevations, **given)
+        for number, share in enumerate(shares):
+            alone = trace.refracted_rays(lambda h, s=share: coloured(h, s), elevations, **given)
+            np.testing.assert_array_equal(together.status[:, number], alone.status)
+            np.testing.assert_allclose(
+                together.refraction[:, number], alone.refraction, rtol=1e-8, atol=1e-10
+            )
+            np.testing.assert_allclose(together.lowest[:, number], alone.lowest, rtol=0, atol=1e-6)
+
+
 def test_what_no_break_tells_is_found() -> None:
     """The same rays whether or not the kinks and steps of an index are given as breaks."""
     elevations = np.array([-0.0021, -0.0008, 0.0, 2e-4, 0.001, 0.01, 0.3])

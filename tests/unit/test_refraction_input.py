@@ -146,6 +146,17 @@ def test_many_rays_are_taken_in_pieces() -> None:
     assert np.all(np.diff(up) < 0)
 
 
+def test_breaks_that_all_but_coincide_count_as_one() -> None:
+    crowd = [11e3, np.nextafter(11e3, 12e3), 11e3 + 1e-9, 2.0, np.nextafter(2.0, 3.0), 1e-12, -5.0, 95e3]
+    plain, crowded = (
+        trace.astronomical_refraction(
+            exponential, [-1e-4, 0.0, 0.5], radius=R, top=90e3, observer_height=2.0, breaks=breaks
+        )
+        for breaks in ((), crowd)
+    )
+    np.testing.assert_allclose(plain, crowded, rtol=0, atol=1e-12)
+
+
 def test_breaks_and_top_of_the_index_are_taken() -> None:
     air = HohenkerkSinclair(288.15, 101325.0)
     own = trace.astronomical_refraction(air, 0.2, radius=air.radius)

@@ -131,7 +131,9 @@ def astronomical_refraction(
     Kronrod and the 7 of Gauss agree.
 
     Limits: geometrical optics; air in spherical layers. Without `into_vacuum`, the refraction lacks about
-    (n − 1) tan z of the top (0.002″ at the horizon for 86 km).
+    (n − 1) tan z of the top (0.002″ at the horizon for 86 km). Layers in which n r is constant to a part in
+    a thousand leave rays that are level in them good to about 1e-7 rad, by rounding. A layer
+    thinner than a thirtieth of the distance between breaks is found if n differs across it, not otherwise.
 
     References
     ----------

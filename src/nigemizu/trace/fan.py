@@ -192,22 +192,17 @@ class Setting:
             np.ones(len(rows), dtype=bool) if weight == 1.0 else np.all(entering & (lowest <= low), axis=1)
         )
         ducted = bool(self.shells.ducted[layer])
-        end = (
-            ("low" if self.shells.climbs[layer + 1, 0] > self.shells.climbs[layer, 0] else "high")
-            if ducted
-            else ""
-        )
         by_height = whole & (ducted | np.all(sine2_end <= _STEEP * sine2, axis=1))
         if np.any(by_height):
-            chosen = by_height
-            sums[:, rows[chosen]] += weight * over_height(
+            falling = self.shells.climbs[layer + 1, 0] < self.shells.climbs[layer, 0]
+            sums[:, rows[by_height]] += weight * over_height(
                 self.air,
                 measures,
                 low=low[None],
                 high=high[None],
-                sine2=sine2[chosen],
-                cosine2=cosine2[chosen],
-                steep_end=end,
+                sine2=sine2[by_height],
+                cosine2=cosine2[by_height],
+                level_end=("high" if falling else "low") if ducted else "",
             )
         rest = ~by_height
         if not np.any(rest):
@@ -220,7 +215,7 @@ class Setting:
         ends = np.broadcast_to(high, start.shape)
         if ducted:
             sums[:, rows[rest]] += weight * over_height(
-                self.air, measures, low=start, high=ends, sine2=sine2, cosine2=cosine2, steep_end=end
+                self.air, measures, low=start, high=ends, sine2=sine2, cosine2=cosine2, level_end="low"
             )
             return
         angle, angle_end = (

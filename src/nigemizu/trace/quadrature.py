@@ -103,7 +103,7 @@ def over_height(
     high: FloatArray,
     sine2: FloatArray,
     cosine2: FloatArray,
-    steep_end: str = "",
+    level_end: str = "",
 ) -> FloatArray:
     """Integrals (M, N, K) from heights `low` to `high` of rays whose elevation at `low` is given.
 
@@ -114,7 +114,7 @@ def over_height(
     low, high : (N or 1, K) float64, m
     sine2, cosine2 : (N, K) float64, 1
         Squares of the sine and cosine of the elevation at `low`.
-    steep_end : {"", "low", "high"}
+    level_end : {"", "low", "high"}
         Near which end the ray may be all but level: heights crowd there as the square of the variable.
 
     Notes
@@ -130,9 +130,9 @@ def over_height(
         own = rows if len(low) > 1 else slice(None)
         t = (start + (end - start) * NODES)[:, None]
         span = (high - low)[own][:, None]
-        if steep_end == "low":
+        if level_end == "low":
             height, stretch = low[own][:, None] + span * t**2, 2.0 * span * t
-        elif steep_end == "high":
+        elif level_end == "high":
             height, stretch = high[own][:, None] - span * (1.0 - t) ** 2, 2.0 * span * (1.0 - t)
         else:
             height, stretch = low[own][:, None] + span * t, span
@@ -140,11 +140,12 @@ def over_height(
         gain = -np.expm1(-2.0 * air.climb(height, excess, low[own][:, None], here[own][:, None]))
         rise = sine2[rows][:, None] + cosine2[rows][:, None] * gain
         _refuse_turning(rise, span)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            steps = np.where(span > 0.0, (end - start) * stretch / np.sqrt(rise), 0.0)
+        rise = np.where(span > 0.0, rise, 1.0)
+        steps = (end - start) * stretch / np.sqrt(rise)
         level = steps * np.sqrt(cosine2[rows][:, None] * (1.0 - gain))
         values = np.stack([m.amount(height, excess, slope) * (level if m.level else steps) for m in measures])
-        sums, poor = _summed(values, measures)
+        doubt = np.finfo(float).eps * (np.abs(excess) + np.abs(gain)) / rise if level_end else None
+        sums, poor = _summed(values, measures, doubt)
         total[:, rows[~poor]] += sums[:, ~poor]
         if np.any(poor):
             middle = 0.5 * (start + end)
@@ -238,7 +239,8 @@ def solve_climb(
         above = np.where(surplus > 0.0, height, above)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = surplus / rate
-        close = 1e-13 * width + 8.0 * np.finfo(float).eps * (1.0 / np.abs(rate) + np.abs(height))
+        noise = (np.abs(excess) + np.abs(target)) / np.abs(rate) + np.abs(height)
+        close = 1e-13 * width + 8.0 * np.finfo(float).eps * noise
         done = (np.abs(step) <= close) | (above - below <= close)
         if np.all(done):
             return height, excess, slope
@@ -275,15 +277,21 @@ def _guess(
     return np.where((cubic >= low) & (cubic <= high), cubic, plain)
 
 
-def _summed(values: FloatArray, measures: Sequence[Measure]) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Integrals (M, N, K) of values (M, N, 15, K) on the nodes, and which of the N are not yet good."""
+def _summed(
+    values: FloatArray, measures: Sequence[Measure], doubt: FloatArray | None = None
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Integrals (M, N, K) of values (M, N, 15, K) on the nodes, and which of the N are not yet good.
+
+    Values that rounding makes uncertain by a relative `doubt` (N, 15, K) get no better by halving.
+    """
     fine, coarse = (np.einsum("mntk,t->mnk", values, weights) for weights in _WEIGHTS)
     size, gap = np.abs(fine), np.abs(fine - coarse)
-    error = _estimate(size, gap)
     allowed = np.array([m.absolute for m in measures])[:, None, None]
     relative = np.array([m.relative for m in measures])[:, None, None]
-    poor = error > np.maximum(allowed, np.maximum(relative, _NOISE) * size)
-    return fine, np.any(poor, axis=(0, 2))
+    allowed = np.maximum(allowed, np.maximum(relative, _NOISE) * size)
+    if doubt is not None:
+        allowed = np.maximum(allowed, np.einsum("mntk,ntk,t->mnk", np.abs(values), doubt, _WEIGHTS[0]))
+    return fine, np.any(_estimate(size, gap) > allowed, axis=(0, 2))
 
 
 def _estimate(size: FloatArray, gap: FloatArray) -> FloatArray:

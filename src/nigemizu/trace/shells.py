@@ -28,6 +28,7 @@ _FINEST: Final = 1e-13  # by which n may differ from the integral of its slope
 _CLOSE: Final = 1e-6  # the same in terms of the change of n in the layer
 _THINNEST: Final = 1e-4  # m; layers that are halved no more
 _MOST_LAYERS: Final = 5000
+_SAME: Final = 1e-6  # m; between breaks that count as one
 _JUMP: Final = 1e-10  # of n at a break: a horizontal ray turns by √(2e-10) there
 
 
@@ -109,8 +110,11 @@ def arranged(air: SphericalAir, eye: float, *, ground: float, top: float, breaks
     InputError
         The index is not finite, jumps at a break, or its derivative is not that of the index.
     """
-    inner = breaks[(breaks > ground) & (breaks < top)]
-    cuts = np.unique(np.concatenate([[ground, eye, top], inner]))
+    fixed = np.unique([ground, eye, top])
+    inner = np.unique(breaks[(breaks > ground) & (breaks < top)])
+    inner = inner[np.abs(inner[:, None] - fixed).min(axis=1) > _SAME]
+    inner = inner[np.diff(inner, prepend=-np.inf) > _SAME]
+    cuts = np.sort(np.concatenate([fixed, inner]))
     levels, samples, excess, slope = _resolved(air, cuts)
     rates = air.rate(samples[..., None], excess, slope) * (air.radius + samples[..., None])
     ducted = rates.min(axis=(1, 2)) < DUCT
