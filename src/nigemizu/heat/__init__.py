@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         Schedule,
         Stripes,
     )
+    from nigemizu.heat.reading.soundings import Sounding, read_sounding
     from nigemizu.heat.solver import State, evolve, solve
     from nigemizu.heat.transport import Diffusivity, Wind
     from nigemizu.heat.turbulence.field import TurbulentField
@@ -62,6 +63,7 @@ __all__ = [
     "Rectangle",
     "Schedule",
     "Sides",
+    "Sounding",
     "Source",
     "State",
     "Stripes",
@@ -76,6 +78,7 @@ __all__ = [
     "evolve",
     "mean_temperature_at",
     "read_air",
+    "read_sounding",
     "refractivity_at",
     "require_memory",
     "solve",
@@ -89,6 +92,7 @@ _HOMES: Final = {
     "flow.running": ("convect",),
     "flow.settings": ("Convection",),
     "flow.sources": ("Source",),
+    "reading.soundings": ("Sounding", "read_sounding"),
     "solver": ("State", "evolve", "solve"),
     "grid": ("Grid", "GridSpec", "require_memory"),
     "initial": ("Initial", "ProfileTable", "Unevenness"),
