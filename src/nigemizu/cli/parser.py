@@ -10,6 +10,7 @@ import shlex
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
+from nigemizu.cli import tables
 from nigemizu.errors import InputError
 
 __all__ = ["angles", "parse", "picture_size"]
@@ -296,6 +297,7 @@ def _trace(parser: argparse.ArgumentParser) -> None:
         help="from the camera's heading, to the left: list or range",
     )
     parser.add_argument("--time", type=_time, metavar="SECONDS", help="instant of the air")
+    tables.add_flags(parser)
     _json(parser)
     parser.add_argument("-o", "--output", metavar="OUT", help="write .csv, .nc, .png or .svg")
 
