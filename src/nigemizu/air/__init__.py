@@ -2,7 +2,9 @@
 
 from nigemizu.air.atmosphere import Atmosphere
 from nigemizu.air.earth import Earth
+from nigemizu.air.hohenkerk_sinclair import HohenkerkSinclair
 from nigemizu.air.laws import MODELS, critical_angle, peck_reeder, refractivity
+from nigemizu.air.layers import ExponentialLayer, GaussianLayer, Inversion
 from nigemizu.air.moist import (
     compressibility,
     density,
@@ -11,11 +13,22 @@ from nigemizu.air.moist import (
     water_vapour_fraction,
 )
 from nigemizu.air.pressure import hydrostatic_pressure
+from nigemizu.air.profile import LayeredIndex, Profile
+from nigemizu.air.profile_spec import MeasuredAir, ProfileSpec
+from nigemizu.air.standards import standard_atmosphere
 
 __all__ = [
     "MODELS",
     "Atmosphere",
     "Earth",
+    "ExponentialLayer",
+    "GaussianLayer",
+    "HohenkerkSinclair",
+    "Inversion",
+    "LayeredIndex",
+    "MeasuredAir",
+    "Profile",
+    "ProfileSpec",
     "compressibility",
     "critical_angle",
     "density",
@@ -24,5 +37,6 @@ __all__ = [
     "peck_reeder",
     "refractivity",
     "saturation_vapour_pressure",
+    "standard_atmosphere",
     "water_vapour_fraction",
 ]

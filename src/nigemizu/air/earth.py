@@ -37,8 +37,9 @@ class Earth(Value):
     Notes
     -----
     With the conformal height z = R ln(1 + h/R) and the distance x = Rφ along the sea, the lengths of the map
-    are those of the world divided by e^(z/R). Light therefore goes in the map, in the index n′ = n e^(z/R), as
-    it does in the world in n, and makes the same angles with the vertical: the invariant n r cos θ is R n′ cos θ.
+    are those of the world divided by e^(z/R). Light therefore goes in the map, in the index n′ = n e^(z/R),
+    as it does in the world in n, and makes the same angles with the vertical: the invariant n r cos θ is
+    R n′ cos θ.
     Exact in every vertical plane, and so for air in layers.
 
     References
