@@ -15,7 +15,9 @@ from nigemizu.air.moist import (
 from nigemizu.air.pressure import hydrostatic_pressure
 from nigemizu.air.profile import LayeredIndex, Profile
 from nigemizu.air.profile_spec import MeasuredAir, ProfileSpec
+from nigemizu.air.similarity import SurfaceFluxes, psi_heat, psi_momentum
 from nigemizu.air.standards import standard_atmosphere
+from nigemizu.air.surface_layer import SurfaceLayer
 
 __all__ = [
     "MODELS",
@@ -29,12 +31,16 @@ __all__ = [
     "MeasuredAir",
     "Profile",
     "ProfileSpec",
+    "SurfaceFluxes",
+    "SurfaceLayer",
     "compressibility",
     "critical_angle",
     "density",
     "enhancement_factor",
     "hydrostatic_pressure",
     "peck_reeder",
+    "psi_heat",
+    "psi_momentum",
     "refractivity",
     "saturation_vapour_pressure",
     "standard_atmosphere",
