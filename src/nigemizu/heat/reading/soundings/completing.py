@@ -141,7 +141,7 @@ def _vapour(levels: Levels, pressure: FloatArray, file: str) -> tuple[FloatArray
         top = int(np.flatnonzero(known)[-1])
         above = known.size - 1 - top
         notes.append(
-            f"relative humidity interpolated, or held, for want of one: {counted(int((~known).sum()), 'level')}, "
+            f"relative humidity interpolated or held: {counted(int((~known).sum()), 'level')} without any, "
             f"{above} of them above the last that has one"
         )
     return fraction, tuple(notes)

@@ -119,7 +119,8 @@ def fill_pressures(pressure: FloatArray, height: FloatArray, virtual: FloatArray
     # ∫ dH/T of a linear T is (dH/T_mean) artanh(c)/c, c the contrast; the quotient is 1 at c = 0.
     bend = np.divide(np.arctanh(contrast), contrast, out=np.ones_like(contrast), where=contrast != 0.0)
     path = np.concatenate([[0.0], np.cumsum(bend * steps / mean)])
-    return np.exp(_anchored(np.log(pressure), path, -1.0 / SCALE))
+    filled = np.exp(_anchored(np.log(pressure), path, -1.0 / SCALE))
+    return np.where(np.isfinite(pressure), pressure, filled)
 
 
 def _anchored(values: FloatArray, path: FloatArray, slope: float) -> FloatArray:

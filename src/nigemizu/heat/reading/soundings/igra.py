@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from datetime import UTC, datetime
 from pathlib import Path
@@ -77,7 +76,8 @@ def read_igra(path: Path, want: Wanted) -> Levels:
     fitting: dict[int, list[tuple[int, str]]] = {}
     with opened(path) as stream:
         kept: list[tuple[int, str]] | None = None
-        for row, line in enumerate(io.TextIOWrapper(stream, encoding="latin-1"), 1):
+        for row, raw in enumerate(stream, 1):
+            line = raw.decode("latin-1")
             if line.startswith("#"):
                 headers.append(_header(line.rstrip("\r\n"), row, file))
                 # A station's whole record may not fit the memory: only what may be wanted is kept.

@@ -296,10 +296,10 @@ def _merged(levels: Levels) -> Levels:
     if not doubled:
         return levels
     spread = max(float(np.ptp(levels.values["temperature"][group])) for group in doubled)
-    where = [levels.rows[group[1]] for group in doubled]
+    where = [levels.rows[index] for group in doubled for index in group[1:]]
     note = (
-        f"merged with the one below, of the same height or pressure, temperatures up to {spread:.1f} K apart: "
-        f"{counted(sum(map(len, doubled)) - len(doubled), 'level')} ({listed(where)})"
+        f"merged with the one below, of the same height or pressure, up to {spread:.1f} K apart: "
+        f"{counted(len(where), 'level')} ({listed(where)})"
     )
     first = levels.taken(np.array([group[0] for group in groups]), (*levels.notes, note))
     merged = {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import html
-import io
 import re
 import zipfile
 from collections.abc import Iterator
@@ -165,7 +164,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         try:
             if magic == b"PK\x03\x04":
                 with zipfile.ZipFile(stream) as archive, archive.open(_only_member(archive, path)) as member:
-                    yield io.BufferedReader(member)  # type: ignore[type-var]
+                    yield member  # type: ignore[misc]
             elif magic[:2] == b"\x1f\x8b":
                 with gzip.open(stream) as unpacked:
                     yield unpacked  # type: ignore[misc]
