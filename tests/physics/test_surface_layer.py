@@ -244,8 +244,9 @@ def test_layer_fades_into_well_mixed_air() -> None:
 def test_hot_road_is_as_steep_as_roads_that_were_measured() -> None:
     """Asphalt at the hour of greatest heat: of the order of 20–30 K in the first centimetre, 1–2 K/cm above.
 
-    "Surface convection and the distribution of temperature near a heated surface", Nature (1930s). Less hot
-    or windier roads are less steep, hence the lower bounds.
+    Abstract of "Surface convection and the distribution of temperature near a heated surface",
+    discovery.researcher.life/article/…/4da5359b0e6c34ebb5f5043b45a46aef. Cooler or windier roads are less
+    steep: hence the lower bounds.
     """
     first = float(ROAD.temperature(0.0) - ROAD.temperature(0.01))
     assert 1.0 < first < 30.0
