@@ -77,6 +77,17 @@ def test_work_precision_draws_and_prints(
     assert (tmp_path / "again.svg").read_text(encoding="utf-8") == text
 
 
+def test_refraction_table_is_timed(
+    load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    refraction = load("refraction")
+    _typed(monkeypatch, "--json", "--step", "10", "--repeat", "1")
+    refraction.main()
+    measured = json.loads(capsys.readouterr().out)
+    assert measured
+    assert all(row["seconds"] > 0 for row in measured.values())
+
+
 def test_work_precision_refuses_other_pictures(
     load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -35,7 +35,7 @@ OUTSIDE: dict[str, set[str]] = {
     "heat": {"PIL", "numba", "numpy", "pydantic", "pydantic_core", "scipy", "xarray"},
     "field": {"drjit", "numpy", "pydantic", "scipy"},
     "trace": {"drjit", "numpy", "pydantic"},
-    "render": {"PIL", "drjit", "mitsuba", "numpy", "pydantic", "xarray"},
+    "render": {"PIL", "drjit", "mitsuba", "numpy", "pydantic", "pydantic_core", "xarray"},
     "output": {"OpenEXR", "PIL", "av", "matplotlib", "netCDF4", "numpy", "pydantic", "xarray", "zarr"},
     "measure": {"PIL", "av", "netCDF4", "numpy", "pydantic", "scipy", "xarray"},
     "scene": {"drjit", "numpy", "pydantic", "xarray"},

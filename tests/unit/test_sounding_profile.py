@@ -35,6 +35,6 @@ def test_a_sounding_becomes_layers_of_air_that_bend_light(name, time):
     vapour = 3.9e-8 * fraction[0] * pressure[0] / 100.0
     assert index[0] == pytest.approx(dry - vapour, rel=1e-3, abs=0)
     assert abs(vapour / index[0]) > 1.5e-3  # humidity is seen in the index
-    # Over 200 m: temperatures rounded to 0.1 K every 5 m make the index rise and fall, which is not the air's.
+    # Over 200 m: temperatures rounded to 0.1 K every 5 m make the index rise and fall, as no air does.
     steps = refractivity(*profile.at(np.arange(0.0, 15000.0, 200.0))[:2], wavelength=550e-9)
     assert (np.diff(steps) < 0).all()

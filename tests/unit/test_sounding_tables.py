@@ -68,6 +68,13 @@ def test_tables_that_say_the_same(tmp_path, text):
         assert getattr(other, name) == pytest.approx(getattr(first, name), rel=1e-9, abs=0)
 
 
+def test_columns_that_a_program_saved_with_commented_headings(tmp_path):
+    text = "# height [m] temperature [K]\n# surface_pressure: 1000 hPa\n0 300\n1 299.9\n2 299.8\n"
+    sounding = read(tmp_path, text)
+    assert sounding.temperature == pytest.approx([300.0, 299.9, 299.8])
+    assert sounding.pressure[0] == 1e5
+
+
 def test_other_encodings(tmp_path):
     text = table(head=HEAD.replace("[C]", "[°C]"))
     for encoding in ("cp1252", "utf-16"):
@@ -203,6 +210,19 @@ def test_bad_rows_are_refused_with_their_line(tmp_path, rows, words):
     assert "\n" not in str(caught.value)
 
 
+def test_hectopascals_without_a_unit(tmp_path):
+    text = "z,T,p\n0,300.0,1000\n100,299.0,988.7\n200,298.2,977.5\n"
+    with pytest.raises(InputError, match=r"line 2, pressure: too little for the lowest level .*'1000'.*hPa"):
+        read(tmp_path, text)
+
+
+@pytest.mark.parametrize("temperatures", ["[nan, nan, nan, nan]", "[nan, 280.0, nan, nan]"])
+def test_a_table_without_temperatures(tmp_path, temperatures):
+    text = f'surface_pressure = "1000 hPa"\nheight = [0, 1, 2, 3]\ntemperature = {temperatures}'
+    with pytest.raises(InputError, match=r"level.? can be used; expected at least 3"):
+        read(tmp_path, text)
+
+
 def test_celsius_among_kelvins(tmp_path):
     text = "z,T,p\n0,300.0,100000\n100,299.0,98870\n200,26.2,97750\n300,297.5,96640"
     with pytest.raises(
@@ -254,7 +274,10 @@ def test_headings_that_do_not_serve(tmp_path, head, words):
         ("[25, 38, 41, nan]", "25", "humidity: no list"),
         ("[25, 38, 41, nan]", '["wet", 38, 41, nan]', r"entry 1, humidity: no number \(got 'wet'\)"),
         ("31.0", "310.0", r"entry 3, temperature: a value that no air has \(got '310.0'\)"),
-        ("[35.0, 139.0]", "[35.0]", "not what it should be"),
+        ("[35.0, 139.0]", "[35.0]", r"place: no place \(got \[35.0\]\)"),
+        ("[35.0, 139.0]", "[139.0, 35.0]", "air.csv: place: no place"),
+        ("station_height = 12", 'station_height = "tall"', "air.csv: station_height: not what it should be"),
+        ("station_height = 12", 'surface_pressure = "1 furlong"', "air.csv: surface_pressure: units of the"),
         ("2026-07-01T12:00:00Z", '"noon"', r"air.csv: time: no time \(got 'noon'\)"),
         ("[units]", "[units", "not TOML"),
         ('"C"', '"furlong"', "temperature: units of the wrong kind"),

@@ -2,6 +2,7 @@
 
 from nigemizu.air.atmosphere import Atmosphere
 from nigemizu.air.earth import Earth
+from nigemizu.air.extinction import Extinction
 from nigemizu.air.hohenkerk_sinclair import HohenkerkSinclair
 from nigemizu.air.laws import MODELS, critical_angle, peck_reeder, refractivity
 from nigemizu.air.layers import ExponentialLayer, GaussianLayer, Inversion
@@ -24,6 +25,7 @@ __all__ = [
     "Atmosphere",
     "Earth",
     "ExponentialLayer",
+    "Extinction",
     "GaussianLayer",
     "HohenkerkSinclair",
     "Inversion",

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from nigemizu.air.layers import ProfileLayer
 from nigemizu.air.standards import standard_breaks, standard_temperature
+from nigemizu.air.surface_layer import SurfaceLayer
 
-__all__ = ["Continued", "Course", "Linear", "Smooth", "Standard", "Summed"]
+__all__ = ["Continued", "Course", "Linear", "Near", "Smooth", "Standard", "Summed"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -176,6 +177,42 @@ class Continued(Course):
     @property
     def scales(self) -> tuple[tuple[float, float], ...]:
         return self._one.scales
+
+
+@final
+class Near(Course):
+    """A course with a surface layer at the ground that has its own temperature.
+
+    Notes
+    -----
+    What the layer departs from the well-mixed air above it is added, and the course itself is shifted, by a
+    difference that fades over `fading` [m], so that the air has the layer's temperature where that is told.
+    """
+
+    def __init__(self, course: Course, layer: SurfaceLayer, fading: float) -> None:
+        self._course, self._layer, self._fading = course, layer, fading
+        told = np.array([layer.air_height])
+        there = float(course.value_and_slope(told)[0][0] + layer.departure(told)[0])
+        self._shift = (layer.air_temperature - there) * np.exp(layer.air_height / fading)
+
+    def value_and_slope(self, height: FloatArray) -> tuple[FloatArray, FloatArray]:
+        value, slope = self._course.value_and_slope(height)
+        shift = self._shift * np.exp(-height / self._fading)
+        # Pieces of logarithms have no short derivative: a difference over a ten-thousandth of the height.
+        step = 1e-4 * np.maximum(height, self._layer.sublayer_top / 2)
+        up, down = self._layer.departure(height + step), self._layer.departure(np.maximum(height - step, 0.0))
+        rise = (up - down) / (height + step - np.maximum(height - step, 0.0))
+        return value + shift + self._layer.departure(height), slope - shift / self._fading + rise
+
+    @property
+    def breaks(self) -> FloatArray:
+        own = [self._layer.sublayer_top, self._layer.blending_height or np.inf]
+        return np.unique(np.concatenate([self._course.breaks, own]))
+
+    @property
+    def scales(self) -> tuple[tuple[float, float], ...]:
+        steps = self._layer.sublayer_top * 2.0 ** np.arange(0, 16)
+        return (*self._course.scales, *((float(step), float(step) / 6) for step in steps))
 
 
 @final

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, TypeAlias, final
+from typing import TYPE_CHECKING, Final, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -189,12 +189,7 @@ class Profile:
         heights = heights[(heights > self.base) & (heights < self.top)]
         # Breaks stay; what lies within a centimetre of its neighbour is left out.
         ends = np.concatenate([[self.base], self.breaks, [self.top]])
-        apart = (
-            np.min(np.abs(heights[:, None] - ends[None, :]), axis=1)
-            if len(ends) < 400
-            else _nearest(heights, ends)
-        )
-        heights = heights[apart > _KINK / 2]
+        heights = heights[_nearest(heights, ends) > _KINK / 2]
         kept = np.unique(np.concatenate([heights, ends]))
         thin = np.concatenate([[True], np.diff(kept) > _KINK / 4])
         return kept[thin | np.isin(kept, ends)]
@@ -282,14 +277,14 @@ class LayeredIndex:
         return _law(self._atmosphere, self._wavelength, temperature, pressure, fraction)
 
     def _partial(self, state: tuple[FloatArray, FloatArray, FloatArray], number: int) -> FloatArray:
-        step: Any = _STEPS[number] if number != 1 else np.minimum(_STEPS[1], 1e-3 * state[1])
+        step: FloatArray | float = _STEPS[number] if number != 1 else np.minimum(_STEPS[1], 1e-3 * state[1])
         up, down = (
             [part + sign * step if which == number else part for which, part in enumerate(state)]
             for sign in (1, -1)
         )
         if number == 2:
             down[2] = np.maximum(down[2], 0.0)
-            return (self._law(*up) - self._law(*down)) / (up[2] - down[2])
+            return np.asarray((self._law(*up) - self._law(*down)) / (up[2] - down[2]))
         return (self._law(*up) - self._law(*down)) / (2 * step)
 
 
@@ -323,5 +318,6 @@ def _law(
 
 
 def _nearest(heights: FloatArray, ends: FloatArray) -> FloatArray:
+    """Distance of each height to the nearest of the ends, which increase."""
     place = np.clip(np.searchsorted(ends, heights), 1, len(ends) - 1)
-    return np.minimum(np.abs(heights - ends[place - 1]), np.abs(ends[place] - heights))
+    return np.asarray(np.minimum(np.abs(heights - ends[place - 1]), np.abs(ends[place] - heights)))

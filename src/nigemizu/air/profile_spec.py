@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from nigemizu.air.courses import Continued, Course, Linear, Smooth, Standard, Summed
+from nigemizu.air.courses import Continued, Course, Linear, Near, Smooth, Standard, Summed
 from nigemizu.air.earth import Earth
 from nigemizu.air.layers import Layer
 from nigemizu.air.profile import Profile
 from nigemizu.air.standards import STANDARD_TOP, standard_gravity
+from nigemizu.air.surface_layer import SurfaceLayer
 from nigemizu.errors import InputError
 from nigemizu.values import Value
 
@@ -24,6 +25,7 @@ FloatArray: TypeAlias = NDArray[np.float64]
 _HUMID: Final = 12_000.0  # m, over which a standard's relative humidity falls to 0
 _FADING: Final = 3_000.0  # m, over which what continues a table forgets it
 _DRYING: Final = 2_000.0  # m, over which the vapour above a table falls to 1/e
+_BLENDING: Final = 50.0  # m, above which a surface layer fades
 _PRESSURE: Final = 101_325.0
 _COLD, _HOT = 120.0, 400.0  # K: beyond these a temperature is in another unit
 _THIN: Final = 2_000.0  # Pa at the ground: less is in hPa
@@ -77,6 +79,9 @@ class ProfileSpec(Value):
         the last point.
     layers : list of layers
         Added on top: ``inversion``, ``exponential``, ``gaussian``.
+    surface_layer : SurfaceLayer, optional
+        Air that the ground warms or cools while the wind mixes it; its `blending_height` is 50 m where it is
+        not given. The profile is shifted, by a difference that fades over 3 km, to meet its air temperature.
     top : float, m
         Where the air ends; 86 km for the standard of 1976, 80 km for ISA.
 
@@ -101,6 +106,7 @@ class ProfileSpec(Value):
     file: Path | None = None
     smoothing: Annotated[float, Field(ge=0)] | None = Field(None, json_schema_extra={"unit": "m"})
     beyond: Literal["standard", "isothermal"] = "standard"
+    surface_layer: SurfaceLayer | None = None
     layers: tuple[Layer, ...] = ()
     top: Annotated[float, Field(gt=1000, le=86_000)] | None = Field(None, json_schema_extra={"unit": "m"})
 
@@ -232,6 +238,11 @@ class ProfileSpec(Value):
         pressure: float = _PRESSURE,
         **rest: Any,
     ) -> Profile:
+        if self.surface_layer is not None:
+            layer = self.surface_layer
+            if layer.blending_height is None:
+                layer = layer.model_copy(update={"blending_height": _BLENDING})
+            course = Near(course, layer, _FADING)
         if self.layers:
             course = Summed(course, self.layers)
         at_base = pressure if self.surface_pressure is None else self.surface_pressure

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nigemizu.cli import tables
 from nigemizu.cli.meter import meter
 from nigemizu.cli.stats import Stats
 from nigemizu.errors import InputError
@@ -115,6 +116,11 @@ def trace(options: argparse.Namespace) -> int:
     from nigemizu.output import ready_to_write
 
     scene = _scene(options)
+    if options.table is not None:
+        _use_threads(options.threads)
+        with _naming(options.scene), meter(quiet=options.quiet) as progress:
+            return tables.run(options, scene, progress)
+    tables.require_table(options)
     if options.output is not None:
         ready_to_write(options.output, (".csv", ".nc", ".png", ".svg"))
     elif not options.json:
@@ -197,10 +203,9 @@ def check(options: argparse.Namespace) -> int:
         scene = scene_class.load(name, overrides)
         with _naming(name):
             scene.check()
-        nz, ny, nx = scene.grid.cells[::-1]
-        print(
-            f"{name}: valid ({scene.title or 'untitled'}; {nx}×{ny}×{nz} cells, {len(scene.objects)} objects)"
-        )
+        cells = [] if scene.grid is None else [f"{'×'.join(map(str, scene.grid.cells))} cells"]
+        parts = [scene.title or "untitled", ", ".join([*cells, f"{len(scene.objects)} objects"])]
+        print(f"{name}: valid ({'; '.join(parts)})")
     return 0
 
 

@@ -16,7 +16,7 @@ from nigemizu.field.cell import Cell
 from nigemizu.field.quiet import QuietBlocks, find_quiet
 from nigemizu.field.splines import column_slopes, upper_powers
 from nigemizu.field.types import Precision, Types, aligned_zeros
-from nigemizu.field.voxels import Beyond, VoxelField, horizontal_means, read_mesh
+from nigemizu.field.voxels import COLUMNS_REACH, Beyond, VoxelField, horizontal_means, read_mesh
 
 __all__ = ["StratifiedVolume"]
 
@@ -42,6 +42,8 @@ class StratifiedVolume(VoxelField):
         still air is crossed in one go; 0: not at all.
     storage : {"single", "double"}, optional
         Precision of the stored voxels; by default that of `types`.
+    reach : float, m
+        How far uneven air goes on beyond extended sides.
 
     Raises
     ------
@@ -86,11 +88,12 @@ class StratifiedVolume(VoxelField):
         *,
         flatness: float = 0.0,
         storage: Precision | None = None,
+        reach: float = COLUMNS_REACH,
     ) -> None:
         if not 0 <= flatness < np.inf:
             raise InputError("must be 0 or positive, and finite", key="flatness", value=flatness)
         nodes, data = read_mesh(x, y, z, refractivity, beyond, per_node=2)
-        super().__init__(nodes, types, beyond)
+        super().__init__(nodes, types, beyond, reach)
         self._shape = data.shape
         self._row, self._layer = data.shape[2], data.shape[1] * data.shape[2]
         self._deviation = None

@@ -30,6 +30,8 @@ class VoxelField(BoxedField):
     nodes : list of (nx,), (ny,), (nz,) float64, m
     types : Types
     beyond : {"straight", "extend", "mean"}
+    reach : float, m
+        How far uneven air goes on beyond extended sides.
 
     Attributes
     ----------
@@ -42,12 +44,15 @@ class VoxelField(BoxedField):
     _background: Background
     _deviation: Any
 
-    def __init__(self, nodes: list[NDArray[np.float64]], types: Types, beyond: Beyond) -> None:
+    def __init__(
+        self, nodes: list[NDArray[np.float64]], types: Types, beyond: Beyond, reach: float = COLUMNS_REACH
+    ) -> None:
         x, y, z = (make_axis(axis, types, key=key) for axis, key in zip(nodes, "xyz", strict=True))
         self._axes = x, y, z
         lower, upper = [float(axis[0]) for axis in nodes], [float(axis[-1]) for axis in nodes]
         self._columns = list(zip(lower[:2], upper[:2], strict=True))
         self._extended = beyond != "straight"
+        self._reach = reach
         if self._extended:
             lower[:2], upper[:2] = [-np.inf] * 2, [np.inf] * 2
         super().__init__(types, tuple(lower), tuple(upper))
@@ -60,7 +65,7 @@ class VoxelField(BoxedField):
         """End extended sides where uneven columns cannot go on; called by heirs that store a deviation."""
         if self._extended:
             for number, (first, last) in enumerate(self._columns):
-                bounds = first - COLUMNS_REACH, last + COLUMNS_REACH
+                bounds = first - self._reach, last + self._reach
                 self._axes[number].outer = bounds
                 self._lower = (*self._lower[:number], bounds[0], *self._lower[number + 1 :])
                 self._upper = (*self._upper[:number], bounds[1], *self._upper[number + 1 :])

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from nigemizu.render.camera import Camera
 from nigemizu.render.diffraction import diffract
-from nigemizu.render.light import Light
-from nigemizu.render.materials import Asphalt, Checker, Colour, Dots, Masonry, Material, Sand, Texture
+from nigemizu.render.light import Light, Moon
+from nigemizu.render.materials import Asphalt, Checker, Colour, Dots, Masonry, Material, Sand, Texture, Water
 from nigemizu.render.noise import Noise, add_noise
 from nigemizu.render.objects import (
     Aircraft,
@@ -32,6 +32,7 @@ from nigemizu.render.objects import (
 if TYPE_CHECKING:
     from nigemizu.render.assembly import build
     from nigemizu.render.frame import Frame, surface_query
+    from nigemizu.render.globe import Globe
     from nigemizu.render.media import medium_of
     from nigemizu.render.passes import Picture, picture
     from nigemizu.render.path_tracer import integrator
@@ -48,6 +49,7 @@ __all__ = [
     "Colour",
     "Dots",
     "Frame",
+    "Globe",
     "Ground",
     "Hills",
     "Light",
@@ -55,6 +57,7 @@ __all__ = [
     "Material",
     "Mesh",
     "MitsubaFile",
+    "Moon",
     "Noise",
     "Object",
     "Picture",
@@ -66,6 +69,7 @@ __all__ = [
     "Sphere",
     "Texture",
     "Vehicle",
+    "Water",
     "add_noise",
     "build",
     "diffract",
@@ -81,6 +85,7 @@ __all__ = [
 # Loaded when first used: these modules import Mitsuba.
 _NEEDS_MITSUBA: Final = {
     "Frame": "frame",
+    "Globe": "globe",
     "Picture": "passes",
     "Settings": "settings",
     "build": "assembly",

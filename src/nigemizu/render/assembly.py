@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Final
 
 import mitsuba as mi
@@ -14,9 +12,10 @@ import numpy as np
 
 from nigemizu.errors import InputError
 from nigemizu.render import aircraft, meshes, vehicle
+from nigemizu.render.bsdfs import bsdf_of, demand_file, glossy, ground_bsdf, matt, naming
 from nigemizu.render.camera import Camera
 from nigemizu.render.light import Light
-from nigemizu.render.materials import Asphalt, Checker, Colour, Dots, Masonry, Material, Sand, Texture
+from nigemizu.render.materials import Masonry, Texture
 from nigemizu.render.objects import (
     Aircraft,
     Box,
@@ -27,12 +26,11 @@ from nigemizu.render.objects import (
     Object,
     Pole,
     Pyramid,
-    Road,
     Sphere,
     Vehicle,
 )
 from nigemizu.render.sensors import sensor
-from nigemizu.render.sky import bake
+from nigemizu.render.sky import Sky, bake
 
 __all__ = ["build"]
 
@@ -50,7 +48,14 @@ _PARTS: Final[dict[str, tuple[tuple[float, float, float], bool]]] = {
 _HEADLIGHT: Final = 30.0  # radiance of a lamp that is on, in units of sunlit white
 
 
-def build(camera: Camera, light: Light, objects: Sequence[Object], *, integrator: Any) -> Any:
+def build(
+    camera: Camera,
+    light: Light,
+    objects: Sequence[Object],
+    *,
+    integrator: Any,
+    sky: Sky | None = None,
+) -> Any:
     """A Mitsuba scene of these values.
 
     Parameters
@@ -63,6 +68,8 @@ def build(camera: Camera, light: Light, objects: Sequence[Object], *, integrator
         What stands in the scene.
     integrator : mi.Integrator or dict
         From `nigemizu.render.integrator`, or any of Mitsuba's own.
+    sky : Sky, optional
+        Of a physical sky, that which lights the objects.
 
     Returns
     -------
@@ -78,7 +85,7 @@ def build(camera: Camera, light: Light, objects: Sequence[Object], *, integrator
         "type": "scene",
         "integrator": integrator,
         "sensor": sensor(camera),
-        **bake(light).emitters(),
+        **(bake(light) if sky is None else sky).emitters(),
     }
     for index, item in enumerate(objects):
         for name, shape in _shapes(item, f"objects.{index}", camera).items():
@@ -115,7 +122,7 @@ def _shapes(item: Object, key: str, camera: Camera) -> dict[str, Any]:
         case Pyramid():
             triangles = _pyramid(item).moved(item.position, item.rotation)
             place = (item.position, item.rotation)
-            return {"pyramid": _mesh(triangles, _bsdf(item.material, f"{key}.material", camera, place))}
+            return {"pyramid": _mesh(triangles, bsdf_of(item.material, f"{key}.material", camera, place))}
         case Box():
             return {"box": _box(item, key, camera)}
         case Pole():
@@ -126,13 +133,13 @@ def _shapes(item: Object, key: str, camera: Camera) -> dict[str, Any]:
                     "type": "sphere",
                     "center": list(item.position),
                     "radius": item.radius,
-                    "bsdf": _bsdf(item.material, f"{key}.material", camera, (item.position, 0.0)),
+                    "bsdf": bsdf_of(item.material, f"{key}.material", camera, (item.position, 0.0)),
                 }
             }
         case Mesh():
             return {"mesh": _mesh_file(item, key, camera)}
         case Hills():
-            return {"hills": _mesh(meshes.hills(item), _matt(item.colour))}
+            return {"hills": _mesh(meshes.hills(item), matt(item.colour))}
         case Vehicle():
             scale, paint = item.length / vehicle.LENGTH, {"paint": item.colour}
             return _painted(item, vehicle.car(), scale, paint, item.headlights)
@@ -145,110 +152,8 @@ def _shapes(item: Object, key: str, camera: Camera) -> dict[str, Any]:
 
 
 def _ground(item: Ground, key: str, camera: Camera) -> Any:
-    bsdf = _ground_bsdf(item.material, item.road, f"{key}.material", camera)
+    bsdf = ground_bsdf(item.material, item.road, f"{key}.material", camera)
     return _mesh(meshes.plain(item.height), bsdf)
-
-
-def _ground_bsdf(material: Material, road: Road | None, key: str, camera: Camera) -> dict[str, Any]:
-    if not isinstance(material, Sand | Asphalt | Colour) or (road is None and isinstance(material, Colour)):
-        if road is not None:
-            raise InputError("a road goes on sand, asphalt or a plain colour", key=key, value=material.kind)
-        return _bsdf(material, key, camera, ((0.0, 0.0, 0.0), 0.0))
-    texture = {
-        **_seen("nigemizu_ground", camera),
-        "colour": mi.ScalarColor3f(list(material.colour)),
-        "contrast": 0.0 if isinstance(material, Colour) else material.contrast,
-        "seed": 0 if isinstance(material, Colour) else material.seed,
-        "scale": material.scale if isinstance(material, Sand) else 9.0,
-    }
-    if road is not None:
-        texture |= {
-            "road_width": road.width,
-            "road_centre": road.centre,
-            "road_colour": mi.ScalarColor3f(list(road.surface.colour)),
-            "road_contrast": road.surface.contrast,
-            "line_colour": mi.ScalarColor3f(list(road.line_colour)),
-            "line_width": road.line_width,
-            "edge_inset": road.edge_inset,
-            "dash": road.dash,
-            "gap": road.gap,
-        }
-    return {"type": "diffuse", "reflectance": texture}
-
-
-def _bsdf(
-    material: Material, key: str, camera: Camera, place: tuple[tuple[float, float, float], float]
-) -> dict[str, Any]:
-    position, rotation = place
-    match material:
-        case Colour():
-            return _matt(material.colour)
-        case Texture():
-            _demand_file(material.image, f"{key}.image")
-            with _naming(f"{key}.image", material.image):
-                bitmap = mi.load_dict(
-                    {
-                        "type": "bitmap",
-                        "filename": str(material.image),
-                        "to_uv": mi.ScalarTransform3f().scale(list(material.repeat)),
-                    }
-                )
-            return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": bitmap}}
-        case Sand() | Asphalt():
-            return {"type": "twosided", "bsdf": _ground_bsdf(material, None, key, camera)}
-        case Checker():
-            first, second = material.colours
-            texture = {
-                **_seen("nigemizu_checker", camera),
-                "colour": mi.ScalarColor3f(list(first)),
-                "other": mi.ScalarColor3f(list(second)),
-                "size": material.size,
-            }
-        case Dots():
-            first, second = material.colours
-            texture = {
-                **_seen("nigemizu_dots", camera),
-                "colour": mi.ScalarColor3f(list(first)),
-                "other": mi.ScalarColor3f(list(second)),
-                "diameter": material.diameter,
-                "density": material.density,
-                "seed": material.seed,
-                "centre": list(position),
-                "turn": math.radians(rotation),
-            }
-        case Masonry():
-            texture = {
-                **_seen("nigemizu_masonry", camera),
-                "colour": mi.ScalarColor3f(list(material.colour)),
-                "contrast": material.contrast,
-                "seed": material.seed,
-                "course": material.course,
-                "centre": list(position),
-                "turn": math.radians(rotation),
-            }
-    return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": texture}}
-
-
-def _seen(plugin: str, camera: Camera) -> dict[str, Any]:
-    return {"type": plugin, "eye": list(camera.eye), "pixel_angle": camera.pixel_angle}
-
-
-def _matt(colour: Sequence[float]) -> dict[str, Any]:
-    return {
-        "type": "twosided",
-        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(colour)}},
-    }
-
-
-def _glossy(colour: Sequence[float]) -> dict[str, Any]:
-    return {
-        "type": "twosided",
-        "bsdf": {
-            "type": "roughplastic",
-            "diffuse_reflectance": {"type": "rgb", "value": list(colour)},
-            "alpha": 0.05,
-        },
-    }
 
 
 def _mesh(triangles: meshes.Triangles, bsdf: dict[str, Any], **extra: Any) -> Any:
@@ -294,7 +199,7 @@ def _box(item: Box, key: str, camera: Camera) -> dict[str, Any]:
     return {
         "type": "cube",
         "to_world": placed @ transform().scale(half),
-        "bsdf": _bsdf(item.material, f"{key}.material", camera, (item.position, item.rotation)),
+        "bsdf": bsdf_of(item.material, f"{key}.material", camera, (item.position, item.rotation)),
     }
 
 
@@ -304,7 +209,7 @@ def _pole(item: Pole) -> dict[str, Any]:
     for index in range(item.bands):
         start, end = np.array([x, y, z + index * band]), np.array([x, y, z + (index + 1) * band])
         triangles = meshes.cylinder(start, end, item.diameter / 2)
-        shapes[f"band{index}"] = _mesh(triangles, _matt(item.colours[index % 2]))
+        shapes[f"band{index}"] = _mesh(triangles, matt(item.colours[index % 2]))
     return shapes
 
 
@@ -318,8 +223,8 @@ def _painted(
     """Parts of a vehicle by material, in its place."""
     shapes = {}
     for name, parts in groups.items():
-        colour, glossy = (paint[name], True) if name in paint else _PARTS[name]
-        bsdf = _glossy(colour) if glossy else _matt(colour)
+        colour, shiny = (paint[name], True) if name in paint else _PARTS[name]
+        bsdf = glossy(colour) if shiny else matt(colour)
         extra = {}
         if name == "lamp" and lamps_on:
             extra["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": _HEADLIGHT}}
@@ -330,7 +235,7 @@ def _painted(
 
 
 def _mesh_file(item: Mesh, key: str, camera: Camera) -> Any:
-    _demand_file(item.file, f"{key}.file")
+    demand_file(item.file, f"{key}.file")
     kind = item.file.suffix.lower().lstrip(".")
     if kind not in ("ply", "obj"):
         raise InputError(
@@ -341,40 +246,24 @@ def _mesh_file(item: Mesh, key: str, camera: Camera) -> Any:
     placed = placed @ transform().scale(item.scale)
     if item.up == "y":
         placed = placed @ transform().rotate([1, 0, 0], 90)
-    bsdf = _bsdf(item.material, f"{key}.material", camera, (item.position, item.rotation))
-    with _naming(f"{key}.file", item.file):
+    bsdf = bsdf_of(item.material, f"{key}.material", camera, (item.position, item.rotation))
+    with naming(f"{key}.file", item.file):
         return mi.load_dict({"type": kind, "filename": str(item.file), "to_world": placed, "bsdf": bsdf})
 
 
 def _foreign(item: MitsubaFile, key: str) -> dict[str, Any]:
     if item.file is not None:
-        _demand_file(item.file, f"{key}.file")
-        with _naming(f"{key}.file", item.file):
+        demand_file(item.file, f"{key}.file")
+        with naming(f"{key}.file", item.file):
             loaded = mi.load_file(str(item.file))
         return {f"shape{index}": shape for index, shape in enumerate(loaded.shapes())}
     fragment = dict(item.fragment or {})
     parts = {"shape": fragment} if "type" in fragment else fragment
     found = {}
     for name, part in parts.items():
-        with _naming(f"{key}.fragment.{name}", None):
+        with naming(f"{key}.fragment.{name}", None):
             loaded = mi.load_dict(part)
         if not isinstance(loaded, mi.Shape):
             raise InputError("not a Mitsuba shape", key=f"{key}.fragment.{name}", value=part.get("type"))
         found[name] = loaded
     return found
-
-
-def _demand_file(path: Path, key: str) -> None:
-    if not path.is_file():
-        raise InputError("file not found", key=key, file=str(path))
-
-
-@contextlib.contextmanager
-def _naming(key: str, path: Path | None) -> Iterator[None]:
-    """Say of which key and file it is that Mitsuba complains."""
-    try:
-        yield
-    except (RuntimeError, TypeError) as error:
-        reason = str(error).strip().splitlines()[-1]
-        where = None if path is None else str(path)
-        raise InputError(f"Mitsuba cannot read it: {reason}", key=key, file=where) from error

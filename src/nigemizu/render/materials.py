@@ -10,7 +10,7 @@ from pydantic import Field
 from nigemizu.render.light import Reflectance
 from nigemizu.values import Value
 
-__all__ = ["Asphalt", "Checker", "Colour", "Dots", "Masonry", "Material", "Sand", "Texture"]
+__all__ = ["Asphalt", "Checker", "Colour", "Dots", "Masonry", "Material", "Sand", "Texture", "Water"]
 
 Length = Annotated[float, Field(gt=0, json_schema_extra={"unit": "m"})]
 Positive = Annotated[float, Field(gt=0)]
@@ -158,7 +158,32 @@ class Dots(Value):
     seed: Annotated[int, Field(ge=0)] = 0
 
 
+@final
+class Water(Value):
+    """Sea or lake, rough with waves that are smaller than a pixel.
+
+    The slopes of its facets are distributed as Cox and Munk found them on the sea: their mean square is
+    0.003 + 0.00512 times the wind.
+
+    Parameters
+    ----------
+    wind : float, m/s
+        12.5 m above the water.
+    colour : (r, g, b)
+        Reflectance of the water under the surface.
+
+    References
+    ----------
+    C. Cox, W. Munk (1954), Measurement of the roughness of the sea surface from photographs of the Sun's
+    glitter, Journal of the Optical Society of America 44, 838–850, doi:10.1364/JOSA.44.000838.
+    """
+
+    kind: Literal["water"] = "water"
+    wind: Annotated[float, Field(ge=0, le=30, json_schema_extra={"unit": "m/s"})] = 4.0
+    colour: Reflectance = (0.006, 0.016, 0.022)
+
+
 Material = Annotated[
-    Colour | Texture | Sand | Asphalt | Checker | Masonry | Dots, Field(discriminator="kind")
+    Colour | Texture | Sand | Asphalt | Checker | Masonry | Dots | Water, Field(discriminator="kind")
 ]
 """Any material, told apart by its ``kind``."""

@@ -56,6 +56,7 @@ def medium_of(
     precision: Precision = "single",
     storage: Precision | None = None,
     angle: float = 0.0,
+    reach: float | None = None,
 ) -> Any:
     """Air on a grid as what the tracer's method wants: a volume, or panes cut from its mean profile.
 
@@ -73,6 +74,8 @@ def medium_of(
         Precision of the voxels; default: that of the positions.
     angle : float, rad
         By how much a ray across the whole volume may turn otherwise, so that still air is crossed in one go.
+    reach : float, m, optional
+        How far air goes on beyond its sides; for the interpolation "stratified" alone.
     """
     if tracer.precision != "auto":
         precision = tracer.precision
@@ -91,6 +94,10 @@ def medium_of(
     axes = (x, y, z, refractivity, types)
     if tracer.interpolation == "tricubic":
         return field.TricubicVolume(*axes, beyond=tracer.beyond, storage=storage)
-    across = max(float(np.hypot(x[-1] - x[0], y[-1] - y[0])), 1.0)
-    volume = field.StratifiedVolume if tracer.interpolation == "stratified" else field.TrilinearVolume
-    return volume(*axes, beyond=tracer.beyond, flatness=angle / across, storage=storage)
+    across = max(float(np.hypot(x[-1] - x[0], y[-1] - y[0])), 1.0) if reach is None else reach
+    options: dict[str, Any] = {"beyond": tracer.beyond, "flatness": angle / across, "storage": storage}
+    if tracer.interpolation == "trilinear":
+        return field.TrilinearVolume(*axes, **options)
+    if reach is not None:
+        options["reach"] = reach
+    return field.StratifiedVolume(*axes, **options)

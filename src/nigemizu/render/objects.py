@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, final
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from nigemizu.render.light import Reflectance
 from nigemizu.render.materials import Asphalt, Colour, Masonry, Material, Sand
-from nigemizu.values import Value
+from nigemizu.values import Value, nearest
 
 __all__ = [
     "Aircraft",
@@ -29,7 +32,38 @@ __all__ = [
 Length = Annotated[float, Field(gt=0, json_schema_extra={"unit": "m"})]
 Coordinate = Annotated[float, Field(json_schema_extra={"unit": "m"})]
 Degrees = Annotated[float, Field(ge=-360, le=360, json_schema_extra={"unit": "degree"})]
-Position = Annotated[tuple[float, float, float], Field(json_schema_extra={"unit": "m"})]
+
+
+def _read_place(given: Any) -> Any:
+    """A place told by distance, bearing and height, as coordinates."""
+    if not isinstance(given, Mapping):
+        return given
+    known = ("distance", "bearing", "height")
+    for key in given:
+        if key not in known:
+            raise PydanticCustomError(
+                "unknown_key", "unknown key", {"key": str(key), "remedy": nearest(str(key), known)}
+            )
+    if "distance" not in given:
+        raise PydanticCustomError("wrong_type", "is missing", {"key": "distance", "expected": "metres"})
+    place = _Place.model_validate(dict(given))
+    turn = math.radians(place.bearing)
+    return place.distance * math.sin(turn), place.distance * math.cos(turn), place.height
+
+
+@final
+class _Place(Value):
+    """Distance along the ground from x = y = 0, compass bearing (0 = +y, 90 = +x), height."""
+
+    distance: Annotated[float, Field(ge=0, json_schema_extra={"unit": "m"})]
+    bearing: Annotated[float, Field(ge=-360, le=360, json_schema_extra={"unit": "degree"})] = 90.0
+    height: Annotated[float, Field(json_schema_extra={"unit": "m"})] = 0.0
+
+
+Position = Annotated[
+    tuple[float, float, float], BeforeValidator(_read_place), Field(json_schema_extra={"unit": "m"})
+]
+"""(x, y, z), or ``{ distance, bearing, height }``, the bearing by compass: 0 = +y (north), 90 = +x (east)."""
 
 
 @final

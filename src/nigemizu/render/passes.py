@@ -61,7 +61,8 @@ class Picture:
     seconds : float
         Time that the rays took, compilation included.
     report : ErrorReport or None
-        Their errors; None where the scene's integrator is not nigemizu's, or bends nothing.
+        Their errors; None where the scene's integrator is not nigemizu's, or bends nothing, or
+        where they were not measured.
     """
 
     radiance: NDArray[np.float32]
@@ -79,6 +80,7 @@ def picture(
     frame: int = 0,
     exposure: float = 0.0,
     shots: Iterable[Shot] | None = None,
+    measured: bool = True,
     progress: ProgressMeter = SILENT,
 ) -> Picture:
     """Render a Mitsuba scene in passes of a few samples per pixel.
@@ -97,6 +99,8 @@ def picture(
         Parts that the picture is the weighted mean of, with `samples` rays per pixel together. Each is taken
         from the iterable when those before it are rendered, so that a generator can put other air in between.
         Default: one shot.
+    measured : bool
+        Whether the errors of the rays are measured.
     progress : ProgressMeter
         Advances by the samples per pixel of each pass; interruptible between passes.
 
@@ -108,7 +112,7 @@ def picture(
     if samples < 1:
         raise InputError("at least one sample per pixel is needed", key="samples", value=samples)
     began = time.perf_counter()
-    exposing = _Exposing(scene, [seed, frame], progress)
+    exposing = _Exposing(scene, [seed, frame], measured, progress)
     progress.start("rendering", samples)
     try:
         for shot in (Shot(samples),) if shots is None else shots:
@@ -129,8 +133,9 @@ def picture(
 class _Exposing:
     """A picture under way: light is added, shot by shot and pass by pass."""
 
-    def __init__(self, scene: Any, seeds: list[int], progress: ProgressMeter) -> None:
+    def __init__(self, scene: Any, seeds: list[int], measured: bool, progress: ProgressMeter) -> None:
         self._scene, self._seeds, self._progress = scene, seeds, progress
+        self._measured = measured
         self._integrator, self._sensor = scene.integrator(), scene.sensors()[0]
         self._counted = hasattr(self._integrator, "reset_counts")
         if self._counted:
@@ -154,7 +159,7 @@ class _Exposing:
         self.weight += shot.weight
         self._shots += 1
         # Measuring takes as long as some passes: with many shots it is done for ever fewer of them.
-        if self._counted and self._shots & (self._shots - 1) == 0:
+        if self._measured and self._counted and self._shots & (self._shots - 1) == 0:
             report = self._integrator.report(self._scene, sensor)
             self.reports += [] if report is None else [report]
 

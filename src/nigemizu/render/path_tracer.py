@@ -92,6 +92,8 @@ def integrator_class(variant: str) -> Any:
             self.extinction = 0.0 if visibility is None else KOSCHMIEDER / (visibility * self.frame.scale)
             self.limit_depth = 2**32 - 1 if settings.max_depth < 0 else settings.max_depth
             self.bends_scattered = True
+            self.globe: Any = None  # a Globe; None: the world is flat
+            self.heavens: Any = None  # a Heavens; None: the sky is the scene's environment emitter
             self.planned = 0  # samples per pixel of all passes together; 0: those of each render call
             self.reset_counts()
             self.bending = Bending(medium, settings.tracer, self.frame, reference)
@@ -137,11 +139,20 @@ def integrator_class(variant: str) -> Any:
             previous = dr.zeros(mi.Interaction3f)
             pdf_previous = mi.Float(1)
             delta_previous = mi.Bool(True)
+            # Light of one wavelength, from beyond the air and from the air itself
+            S = mi.Spectrum(0)
+            apparent = mi.Vector3f(ray.d)
 
             # ---------------------- the bent segment from the eye ----------------------
             ray, met, s, status = self.bending.follow_from_eye(scene, ray, active)
 
             while dr.hint(active, label="nigemizu"):
+                # ---------------------- out of the air, over a round Earth ----------------------
+                local = mi.Vector3f(ray.d)
+                if dr.hint(self.globe is not None, mode="scalar"):
+                    leaves = active & ~met.is_valid()
+                    ray.d = dr.select(leaves, self.globe.outward(ray.o, ray.d), ray.d)
+
                 # ---------------------- what its last straight piece meets ----------------------
                 si = met.compute_surface_interaction(ray, mi.RayFlags.All, active)
                 s += dr.select(si.is_valid(), si.t, 0)
@@ -155,13 +166,24 @@ def integrator_class(variant: str) -> Any:
                     L[seen] += β * (1 - clear) * self.horizon_radiance(scene, ray, seen)
                     β[seen] *= clear
 
+                # ---------------------- one wavelength of air, Sun and sky ----------------------
+                starry = mi.Bool(False)
+                if dr.hint(self.heavens is not None, mode="scalar"):
+                    starry = active & ~si.is_valid() & delta_previous
+                    elevation = self.heavens.elevation(dr.select(depth == 0, apparent, ray.d), local)
+                    S[starry] += β * self.heavens.radiance(ray.d, elevation, starry)
+                    seen = active & si.is_valid()
+                    clear = self.heavens.clear(s, ray.o.z, si.p.z)
+                    S[seen] += β * (1 - clear) * self.heavens.airlight(ray.d, seen)
+                    β[seen] *= clear
+
                 # ---------------------- emission ----------------------
                 emitter = si.emitter(scene, active)
                 hidden = mi.Bool(False)
                 if dr.hint(self.settings.hide_emitters, mode="scalar"):
                     hidden = (depth == 0) & (emitter != None)  # noqa: E711  (elementwise)
                 ds = mi.DirectionSample3f(scene, si, previous)
-                lit = active & ~hidden & (emitter != None)  # noqa: E711
+                lit = active & ~hidden & ~starry & (emitter != None)  # noqa: E711
                 pdf_emitter = scene.pdf_emitter_direction(previous, ds, lit & ~delta_previous)
                 weight = dr.select(delta_previous, 1, _balance(pdf_previous, pdf_emitter))
                 L[lit] += β * weight * emitter.eval(si, lit)
@@ -218,6 +240,8 @@ def integrator_class(variant: str) -> Any:
                     met = dr.select(mirrored, met_last, met)
                     s = dr.select(mirrored, before, s)
 
+            if dr.hint(self.heavens is not None, mode="scalar"):
+                L = self.heavens.mixed(L) + S
             return L, valid | self.shows_environment(scene), []
 
         def count(self, status: Any, si: Any, active: Any) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from nigemizu.render.light import Light
 
-__all__ = ["Sky", "bake"]
+__all__ = ["Sky", "bake", "baked_table"]
 
 _ROWS: Final = 1024
 _COLUMNS: Final = 1024
@@ -111,6 +111,41 @@ def bake(light: Light) -> Sky:
     total = from_sky + float(sun @ luminance) * towards[2]
     scale = math.pi / total if total > 0 else 1.0
     return Sky(np.asarray(radiance * scale, dtype=np.float32), towards, sun * scale)
+
+
+def baked_table(
+    table: NDArray[np.float64],
+    elevation: NDArray[np.float64],
+    sun_azimuth: float,
+    sun_direction: NDArray[np.float64],
+    sun_irradiance: NDArray[np.float64],
+) -> Sky:
+    """A sky from a table.
+
+    Parameters
+    ----------
+    table : (E, A, 3) float64
+        Radiance at the elevations, and at azimuths from the Sun that are π (j/(A − 1))².
+    elevation : (E,) float64, rad
+        Increasing, up to the zenith.
+    sun_azimuth : float, rad
+    sun_direction, sun_irradiance : (3,) float64
+        As of `Sky`.
+    """
+    rows, columns = table.shape[:2]
+    polar = (np.arange(_ROWS) + 0.5) * math.pi / _ROWS
+    around = (np.arange(_COLUMNS) + 0.5) * 2 * math.pi / _COLUMNS
+    seen = np.maximum(math.pi / 2 - polar, max(elevation[0], 1e-3))  # the horizon, repeated below
+    row = np.interp(seen, elevation, np.arange(rows))
+    # Columns run against the azimuth from +y, as in the layout of an ``envmap`` that is turned upright.
+    turn = math.pi / 2 - around - sun_azimuth
+    turn = np.abs(turn - 2 * math.pi * np.round(turn / (2 * math.pi)))
+    column = np.sqrt(turn / math.pi) * (columns - 1)
+    i, j = np.minimum(row.astype(int), rows - 2), np.minimum(column.astype(int), columns - 2)
+    u, v = (row - i)[:, None, None], (column - j)[None, :, None]
+    corner = [table[i + a][:, j + b] for a in (0, 1) for b in (0, 1)]
+    radiance = (1 - u) * ((1 - v) * corner[0] + v * corner[1]) + u * ((1 - v) * corner[2] + v * corner[3])
+    return Sky(np.asarray(np.maximum(radiance, 0), dtype=np.float32), sun_direction, sun_irradiance)
 
 
 def _clear_sky(

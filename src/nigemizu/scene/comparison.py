@@ -11,7 +11,7 @@ from nigemizu.scene.running import AirSource, Variant, air_at
 if TYPE_CHECKING:
     from nigemizu.scene.model import Scene
 
-__all__ = ["METHODS", "compare", "single_paths"]
+__all__ = ["METHODS", "compare"]
 
 METHODS: Final = {
     "straight": "straight: no refraction",
@@ -37,16 +37,16 @@ def compare(
     scene.check()
     volume = air_at(scene, time, air, progress)
     pictures = {
-        method: scene.render(air=volume, method=method, variant=variant, progress=progress)
-        for method in METHODS
+        method: scene.render(time, air=volume, method=method, variant=variant, progress=progress)
+        for method in _methods(scene)
     }
     panels = [(METHODS[method], picture.pixels) for method, picture in pictures.items()]
     written = [write_panels(path, panels, provenance=Provenance(scene=scene.to_toml(), command=command))]
-    for single, picture in zip(single_paths(path), pictures.values(), strict=True):
-        written.append(picture.save(single, command=command))
+    for method, picture in pictures.items():
+        written.append(picture.save(path.with_stem(f"{path.stem}_{method}"), command=command))
     return written
 
 
-def single_paths(path: Path) -> list[Path]:
-    """Where the pictures of each method go, beside the comparison `path`."""
-    return [path.with_stem(f"{path.stem}_{method}") for method in METHODS]
+def _methods(scene: Scene) -> list[str]:
+    """Panes are flat: there are none over a round Earth."""
+    return [method for method in METHODS if method != "layered" or not scene.round]

@@ -15,7 +15,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from nigemizu.errors import InputError, MachineError
 from nigemizu.progress import SILENT, ProgressMeter
@@ -31,10 +31,11 @@ if TYPE_CHECKING:
 __all__ = ["Tell", "animate", "frames_folder"]
 
 _Air: TypeAlias = AirVolume | tuple[AirVolume, ...] | None
-_Job: TypeAlias = "tuple[int, _Air, Path, _Truth | None]"
-_Truth: TypeAlias = tuple[Path, float]
+_Job: TypeAlias = "tuple[int, _Air, Path, Path | None]"
 _Outcome: TypeAlias = "tuple[dict[str, int], ErrorReport | None]"
 Tell: TypeAlias = "Callable[[Mapping[str, int], ErrorReport | None], None]"
+
+_MEASURED: Final = 4  # every so many frames of a film the errors of its rays are measured
 
 
 def animate(
@@ -106,8 +107,8 @@ def _require_instants(scene: Scene, air: AirSource) -> None:
         return
     if air is not None:
         require_within(open_air(air), tuple(itertools.chain(*exposures)))
-    elif scene.tracer.method != "straight":
-        scene.initial.sample(scene.grid.build())
+    elif scene.tracer.method != "straight" and scene.heated is not None:
+        scene.heated.initial.sample(scene.heated.grid.build())
 
 
 def _missing(folder: FrameFolder, truths: Path | None) -> list[int]:
@@ -147,7 +148,7 @@ def _jobs(
 
 def _job(scene: Scene, folder: FrameFolder, index: int, air: _Air, truths: Path | None) -> _Job:
     frame = folder.frame(index)
-    return index, air, frame, None if truths is None else (truths / frame.stem, scene.film.times[index])
+    return index, air, frame, None if truths is None else truths / frame.stem
 
 
 def _take(studio: Studio, job: _Job, progress: ProgressMeter) -> _Outcome:
@@ -155,10 +156,12 @@ def _take(studio: Studio, job: _Job, progress: ProgressMeter) -> _Outcome:
     import drjit
 
     index, air, frame, truth = job
-    picture = studio.shoot(air, frame=index, progress=progress)
+    time = studio.scene.film.times[index]
+    # Neighbouring frames err alike, and measuring takes as long as some samples.
+    measured = index % _MEASURED == 0
+    picture = studio.shoot(air, frame=index, time=time, measured=measured, progress=progress)
     if truth is not None:
-        stem, time = truth
-        studio.truth(picture, air, time, frame=index).save(stem)
+        studio.truth(picture, air, time, frame=index).save(truth)
     picture.save(frame)
     drjit.flush_malloc_cache()  # arrays of other sizes follow; kept, those of a long film would add up
     return picture.statuses, picture.report

@@ -5,28 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self, final
+from typing import TYPE_CHECKING, Any, Self, final
 
-from pydantic import model_validator
-
-from nigemizu.air import Atmosphere
 from nigemizu.errors import InputError
-from nigemizu.heat.boundary import GroundBoundary, Sides, Top
-from nigemizu.heat.flow.settings import Convection
-from nigemizu.heat.flow.sources import Source
-from nigemizu.heat.grid import GridSpec
-from nigemizu.heat.initial import Initial
-from nigemizu.heat.transport import Diffusivity, Wind
-from nigemizu.heat.turbulence.settings import Turbulence
 from nigemizu.memory import available_memory
 from nigemizu.progress import SILENT, ProgressMeter
-from nigemizu.render import Camera, Light, Object
 from nigemizu.scene.builtins import builtin_names, builtin_text
 from nigemizu.scene.reading import apply_overrides, parse_toml, read_text, validate
-from nigemizu.scene.times import FilmSpec, TimeSpec
+from nigemizu.scene.sections import Sections
 from nigemizu.scene.writing import to_toml
-from nigemizu.trace import Tracer
-from nigemizu.values import Value, nearest
+from nigemizu.values import nearest
 
 if TYPE_CHECKING:
     import xarray
@@ -41,7 +29,7 @@ __all__ = ["Scene", "builtin_scenes", "load"]
 
 
 @final
-class Scene(Value):
+class Scene(Sections):
     """A whole experiment: the air, how it is heated, how light crosses it, and what is seen.
 
     It is the TOML file, this class, and what the command line's ``--set`` changes.
@@ -54,12 +42,16 @@ class Scene(Value):
         What is shown, and where its numbers come from.
     air : Atmosphere
         Pressure, humidity, wavelength and law of refraction.
-    grid : GridSpec
-        The mesh of the air.
-    initial : Initial
-        Temperature at the beginning.
+    earth : Earth, optional
+        Its size and the latitude; left out, the world is flat.
+    profile : ProfileSpec, optional
+        Air in layers: all there is, or what lies above and beyond the mesh.
+    grid : GridSpec, optional
+        The mesh of air that is heated.
+    initial : Initial, optional
+        Its temperature at the beginning.
     ground, sides, top, diffusivity, wind : GroundBoundary, Sides, Top, Diffusivity, Wind
-        Boundaries of the air, and how heat spreads and is carried.
+        Boundaries of that air, and how heat spreads and is carried.
     process : {"diffusion", "convection"}
         Whether heat spreads in air that the wind alone moves, or hot air rises, breaks up and mixes.
     convection : Convection
@@ -83,38 +75,6 @@ class Scene(Value):
     >>> Scene.from_toml(scene.to_toml()) == scene
     True
     """
-
-    title: str = ""
-    description: str = ""
-    air: Atmosphere = Atmosphere()
-    grid: GridSpec
-    initial: Initial
-    ground: GroundBoundary
-    sides: Sides = Sides()
-    top: Top = Top()
-    diffusivity: Diffusivity = Diffusivity()
-    wind: Wind = Wind()
-    process: Literal["diffusion", "convection"] = "diffusion"
-    convection: Convection = Convection()
-    sources: tuple[Source, ...] = ()
-    turbulence: Turbulence | None = None
-    time: TimeSpec = TimeSpec()
-    film: FilmSpec = FilmSpec()
-    tracer: Tracer = Tracer()
-    camera: Camera = Camera()
-    light: Light = Light()
-    objects: tuple[Object, ...] = ()
-
-    @model_validator(mode="after")
-    def _picture_is_simulated(self) -> Self:
-        if self.time.picture is not None and self.time.picture > self.time.duration:
-            raise InputError(
-                "lies after the simulated time",
-                key="time.picture",
-                value=self.time.picture,
-                expected=f"at most time.duration, {self.time.duration:g} s",
-            )
-        return self
 
     @classmethod
     def load(cls, name_or_path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Self:

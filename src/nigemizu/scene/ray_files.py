@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nigemizu.errors import InputError
+from nigemizu.scene.far_air import natural
 
 if TYPE_CHECKING:
     from nigemizu.output import DiagramRay, Outline, Profile
@@ -110,7 +111,8 @@ def _side_view(rays: TracedRays, reach: float) -> list[DiagramRay]:
 def _profile(rays: TracedRays) -> Profile:
     from nigemizu.output import Profile
 
-    return Profile(rays.air.z, rays.air.refractivity.mean(axis=(1, 2)), rays.air.temperature)
+    heights, refractivity = natural(rays.scene, rays.air)
+    return Profile(heights, refractivity.mean(axis=(1, 2)), rays.air.temperature)
 
 
 def _outlines(scene: Scene) -> list[Outline]:
@@ -163,6 +165,8 @@ def _along(scene: Scene, place: Coordinates) -> float:
 
 
 def _air_end(scene: Scene) -> float:
+    if scene.profile is not None or scene.grid is None:
+        return math.inf
     (x0, x1), (y0, y1) = scene.grid.x, scene.grid.y
     return max(_along(scene, (x, y, 0.0)) for x in (x0, x1) for y in (y0, y1))
 

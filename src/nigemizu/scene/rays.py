@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from nigemizu.errors import InputError
 from nigemizu.progress import ProgressMeter
+from nigemizu.scene.far_air import FarAir, medium
+from nigemizu.scene.mapped import mapped_camera
 from nigemizu.scene.rendering import Studio
 from nigemizu.scene.running import AirSource, AirVolume, Variant, air_at
 
@@ -30,6 +32,7 @@ _FAN: Final = 41  # rays of the fan that is traced when no elevations are given
 _GRAZING: Final = (-1.0, 0.25)  # degrees; what air can turn lies here
 _STATUSES: Final = ("hit", "escaped", "out-of-steps")
 _POINTS: Final = 2000  # points kept along a path, about
+_FAR: Final = 1e5  # m, that straight rays are drawn where no mesh says how far the scene reaches
 _FINER: Final = 0.01  # of the accuracy of pictures, for rays as data
 
 
@@ -159,21 +162,48 @@ def _trace_through(
 
     directions = _directions(scene, elevation, azimuth)
     end, points = _follow(scene, Studio(scene, variant), air, directions, paths)
+    there, ahead, length, points = _in_the_world(scene, end, points)
 
     return TracedRays(
         elevation=elevation,
         azimuth=azimuth,
         status=tuple(RayStatus(int(status)).label for status in np.asarray(end.status)),
-        end=np.asarray(end.position, dtype=np.float64).T,
-        end_direction=np.asarray(end.direction, dtype=np.float64).T,
-        turning_height=_per_ray(end.turning_height, len(elevation)),
+        end=there,
+        end_direction=ahead,
+        turning_height=_heights(scene, _per_ray(end.turning_height, len(elevation))),
         optical_path=_per_ray(end.optical_path, len(elevation)),
-        path_length=_per_ray(end.path_length, len(elevation)),
+        path_length=length,
         steps=_per_ray(end.steps, len(elevation)).astype(np.int64),
         paths=points,
         scene=scene,
         air=air,
     )
+
+
+def _heights(scene: Scene, z: FloatArray) -> FloatArray:
+    return z if scene.earth is None else scene.earth.height(z)
+
+
+def _in_the_world(
+    scene: Scene, end: Any, paths: tuple[FloatArray, ...]
+) -> tuple[FloatArray, FloatArray, FloatArray, tuple[FloatArray, ...]]:
+    """End points, directions, path lengths and paths, with heights in place of the map's z."""
+    position = np.asarray(end.position, dtype=np.float64).T.copy()
+    direction = np.asarray(end.direction, dtype=np.float64).T
+    length = _per_ray(end.path_length, len(position))
+    if scene.earth is None or not scene.round:
+        return position, direction, length, paths
+    position[:, 2] = scene.earth.height(position[:, 2])
+    # A piece of the map is shorter than that of the world by the stretch of its height.
+    for ray, points in enumerate(paths):
+        pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        stretch = scene.earth.stretch(points[:, 2])
+        along = float(pieces.sum())
+        if along > 0:
+            length[ray] *= float((pieces * (stretch[1:] + stretch[:-1])).sum()) / (2 * along)
+    heights = (scene.earth.height(points[:, 2]) for points in paths)
+    lifted = (np.column_stack([points[:, :2], z]) for points, z in zip(paths, heights, strict=True))
+    return position, direction, length, tuple(lifted)
 
 
 def _per_ray(values: Any, count: int) -> FloatArray:
@@ -218,14 +248,16 @@ def _follow(
 ) -> tuple[Any, tuple[FloatArray, ...]]:
     """The ends of the rays in double precision, and their points."""
     from nigemizu import trace
-    from nigemizu.render import medium_of
 
     tracer, surface = scene.tracer, studio.surfaces
-    through = medium_of(*air[:4], tracer=tracer, precision="double")
+    if tracer.method == "straight" and scene.round:
+        air = FarAir.of(scene).vacuum()
+    through = medium(scene, air, precision="double")
     types = through.types
-    origin = types.Array3f(*(types.Float(np.full(len(directions), place)) for place in scene.camera.eye))
+    eye = mapped_camera(scene).eye
+    origin = types.Array3f(*(types.Float(np.full(len(directions), place)) for place in eye))
     ahead = types.Array3f(*(types.Float(np.ascontiguousarray(column)) for column in directions.T))
-    if tracer.method == "straight":
+    if tracer.method == "straight" and not scene.round:
         end = trace.straight(types, origin, ahead, surface=surface, details=True)
         return end, _straight_paths(scene, end, directions) if paths else ()
     if tracer.method == "layered":
@@ -246,13 +278,13 @@ def _follow(
     if not paths:
         return end, ()
     every = max(1, int(np.max(np.asarray(end.steps))) // _POINTS)
-    points, _ = trace.record_paths(through, scene.camera.eye, directions, every=every, **march)
+    points, _ = trace.record_paths(through, eye, directions, every=every, **march)
     return end, tuple(points)
 
 
 def _straight_paths(scene: Scene, end: Any, directions: FloatArray) -> tuple[FloatArray, ...]:
     """From the eye to the hit, or far away."""
-    far = max(abs(edge) for edge in (*scene.grid.x, *scene.grid.y))
+    far = _FAR if scene.grid is None else max(abs(edge) for edge in (*scene.grid.x, *scene.grid.y))
     length = np.where(np.asarray(end.hit), np.asarray(end.path_length), far)
     eye = np.array(scene.camera.eye)
     return tuple(np.stack([eye, eye + reach * way]) for reach, way in zip(length, directions, strict=True))

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any, Final, final
 
 from nigemizu.errors import InputError, NigemizuWarning
 from nigemizu.progress import SILENT, ProgressMeter
+from nigemizu.scene.colours import Colours
+from nigemizu.scene.far_air import FarAir, medium
+from nigemizu.scene.mapped import mapped_camera, mapped_objects
 from nigemizu.scene.picture import RenderedPicture
 from nigemizu.scene.running import AirSource, AirVolume, Variant, air_at, air_instants
 
@@ -39,16 +42,45 @@ class Studio:
     """
 
     def __init__(self, scene: Scene, variant: Variant) -> None:
-        from nigemizu.render import Settings, build, integrator, lens_sensors, select_variant
+        from nigemizu.render import Globe, Settings, integrator, lens_sensors, select_variant
 
         select_variant(variant)
         self._scene, self._variant = scene, variant
         self._without_air: Studio | None = None
-        settings = Settings(tracer=scene.tracer, visibility=scene.light.visibility)
+        self._far = None if scene.profile is None else FarAir.of(scene)
+        self._camera = mapped_camera(scene)
+        tracer = scene.tracer
+        if tracer.method == "straight" and scene.round:
+            tracer = tracer.model_copy(update={"method": "bent"})  # in the map
+        settings = Settings(tracer=tracer, visibility=scene.light.visibility)
         self._integrator = integrator(settings=settings)
-        self._built = build(scene.camera, scene.light, scene.objects, integrator=self._integrator)
+        if scene.earth is not None and scene.round:
+            self._integrator.globe = Globe(scene.earth.radius, self._camera.eye)
+        self._colours: Colours | None = None
+        self._built: Any = None
+        self._light: Any = None
+        self._stand_at(0.0)
         # None stands for the sensor of the built scene itself.
-        self._lens: list[Any] = lens_sensors(scene.camera) or [None]
+        self._lens: list[Any] = lens_sensors(self._camera) or [None]
+
+    def _stand_at(self, time: float) -> None:
+        """Build the scene in the light of a time [s], unless it stands in it already."""
+        from nigemizu.render import build
+
+        light = self._scene.light.at(time)
+        if light == self._light:
+            return
+        self._light, sky = light, None
+        if self._far is not None and light.sky == "physical":
+            self._colours = Colours.of(self._scene, self._far, light, self._camera.eye[2])
+            sky = self._colours.sky
+        objects = mapped_objects(self._scene)
+        self._built = build(self._camera, light, objects, integrator=self._integrator, sky=sky)
+
+    @property
+    def scene(self) -> Scene:
+        """What is seen."""
+        return self._scene
 
     @property
     def surfaces(self) -> Any:
@@ -63,6 +95,8 @@ class Studio:
         *,
         weights: Sequence[float] | None = None,
         frame: int = 0,
+        time: float = 0.0,
+        measured: bool = True,
         progress: ProgressMeter = SILENT,
     ) -> RenderedPicture:
         """Render the scene through air.
@@ -77,6 +111,10 @@ class Studio:
             Share of each instant in the picture, relative to the others. Default: all the same.
         frame : int
             Each draws its own random numbers.
+        time : float, s
+            Where Sun and Moon stand, if they move.
+        measured : bool
+            Whether the errors of the rays are measured.
         progress : ProgressMeter
             Receives how far the work has come.
         """
@@ -84,15 +122,17 @@ class Studio:
         from nigemizu.render.diffraction import WAVELENGTHS
 
         scene, camera = self._scene, self._scene.camera
+        self._stand_at(time)
         airs = [air] if air is None or isinstance(air, AirVolume) else air
         shares = _shares(airs, weights, len(camera.instants(0.0)))
         taken = picture(
             self._built,
-            samples=max(camera.samples, len(shares)),
+            samples=max(camera.samples, len(shares) * self._bands),
             seed=camera.seed,
             frame=frame,
             exposure=camera.exposure,
             shots=self._shots(airs, shares),
+            measured=measured,
             progress=progress,
         )
         noiseless = taken.radiance
@@ -129,11 +169,11 @@ class Studio:
         if air is not None and not isinstance(air, AirVolume):  # otherwise it is in place still
             self._set_air(air[len(air) // 2])
         # Through the middle of the aperture, where there is one.
-        layers = ground_truth(self._integrator.bending, self._built, pinhole_sensor(self._scene.camera))
+        layers = ground_truth(self._integrator.bending, self._built, pinhole_sensor(self._camera))
         if self._without_air is None:
             straight = self._scene.with_changes({"tracer.method": "straight"})
             self._without_air = Studio(straight, self._variant)
-        straight_picture = self._without_air.shoot(None, frame=frame)
+        straight_picture = self._without_air.shoot(None, frame=frame, time=time)
         return PictureTruth(layers, picture.noiseless, straight_picture.noiseless, time, self._scene)
 
     def _shots(self, airs: Iterable[AirVolume | None], shares: Sequence[float]) -> Iterator[Shot]:
@@ -147,11 +187,12 @@ class Studio:
             given += 1
             if given > instants:
                 break
-            self._set_air(air)
-            # Every so many points for each instant: the sequence fills the aperture with any of its parts.
-            points = lens[index % len(lens) :: instants][: samples[index]]
-            for sensor, count in zip(points, _divided(samples[index], len(points)), strict=True):
-                yield Shot(count, sensor, shares[index] * count / samples[index])
+            for band, taken in enumerate(_divided(samples[index], self._bands)):
+                self._set_air(air, band)
+                # Every so many points for each instant: any part of the sequence fills the aperture.
+                points = lens[index % len(lens) :: instants][:taken]
+                for sensor, count in zip(points, _divided(taken, len(points)), strict=True):
+                    yield Shot(count, sensor, shares[index] / self._bands * count / taken)
         if given != instants:
             raise InputError(
                 "one air per instant is needed",
@@ -160,14 +201,23 @@ class Studio:
                 expected=f"{instants}",
             )
 
-    def _set_air(self, air: AirVolume | None) -> None:
-        from nigemizu.render import medium_of
+    @property
+    def _bands(self) -> int:
+        """Number of wavelengths that are rendered one by one."""
+        return 1 if self._colours is None else len(self._colours)
 
+    def _set_air(self, air: AirVolume | None, band: int = 0) -> None:
+        scene = self._scene
+        if air is None and scene.round and self._far is not None:
+            air = self._far.vacuum()
+        elif self._colours is not None and self._far is not None and air is not None:
+            air = self._far.at_wavelength(air, self._colours.wavelength(band))
+        if self._colours is not None:
+            self._integrator.heavens = self._colours.heavens(band, None if air is None else air)
         if air is None:
             self._integrator.set_medium(None)
             return
-        tracer = self._scene.tracer
-        make = partial(medium_of, *air[:4], tracer=tracer, angle=tracer.angle(self._scene.camera.pixel_angle))
+        make = partial(medium, scene, air, angle=scene.tracer.angle(scene.camera.pixel_angle))
         self._integrator.set_medium(make(), partial(make, precision="double", storage="single"))
 
 
@@ -204,9 +254,9 @@ def render(
     scene.check()
     studio = Studio(scene, variant)
     airs = _airs(scene, time, air, progress)
-    picture = studio.shoot(airs, progress=progress)
+    shown = scene.time.shown if time is None else time
+    picture = studio.shoot(airs, time=shown, progress=progress)
     if truth:
-        shown = scene.time.shown if time is None else time
         picture = replace(picture, truth=studio.truth(picture, airs, shown))
     warn_of_lost_rays(picture.statuses, scene)
     if picture.report is not None:

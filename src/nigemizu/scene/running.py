@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from nigemizu.errors import InputError
 from nigemizu.memory import available_memory
 from nigemizu.progress import ProgressMeter
+from nigemizu.scene.far_air import FarAir
 from nigemizu.scene.turbulent import AddedTurbulence
 
 if TYPE_CHECKING:
@@ -51,9 +52,9 @@ class AirVolume(NamedTuple):
     Attributes
     ----------
     x, y, z : (nx,), (ny,), (nz,) float64, m
-        Positions of the nodes.
+        Positions of the nodes; over a round Earth x and y along its surface, and z the conformal height.
     refractivity : (nz, ny, nx) float64, 1
-        n − 1 at the nodes.
+        n − 1 at the nodes; over a round Earth n′ − 1 (`nigemizu.air.Earth`).
     temperature : (nz,) float64, K, optional
         Horizontal mean, for the profile beside a ray diagram; the rays do not need it.
     """
@@ -73,7 +74,9 @@ def simulate(scene: Scene, times: tuple[float, ...], progress: ProgressMeter) ->
     _require_times(times, scene)
     _require_memory(scene, len(times))
     states = _states(scene, times, progress)
-    dataset = to_dataset(scene.grid.build(), states, title=scene.title, scene=scene.to_toml())
+    dataset = to_dataset(
+        scene.require_heated().grid.build(), states, title=scene.title, scene=scene.to_toml()
+    )
     return complete(dataset, scene.air)
 
 
@@ -84,7 +87,8 @@ def save_air(scene: Scene, path: Path, command: str, progress: ProgressMeter) ->
 
     scene.check()
     path = ready_to_write(path, (".zarr", ".nc"))
-    grid, about = scene.grid.build(), {"title": scene.title, "scene": scene.to_toml(), "history": command}
+    grid = scene.require_heated().grid.build()
+    about = {"title": scene.title, "scene": scene.to_toml(), "history": command}
     kept = checkpoints(scene, scene.time.stored, path.with_name(f"{path.name}.checkpoints"))
     states = _states(scene, scene.time.stored, progress) if kept is None else _kept(scene, kept, progress)
     instants = (complete(to_dataset(grid, [state], **about), scene.air) for state in states)
@@ -117,21 +121,26 @@ def air_instants(
     """
     from nigemizu.heat import to_dataset
 
-    turbulence = AddedTurbulence(scene)
     if isinstance(air, AirVolume):  # air that does not change
         yield from (air for _ in times[first:])
         return
     _require_times(times, scene)
+    far = None if scene.profile is None else FarAir.of(scene)
+    if far is not None and air is None and scene.heated is None:
+        alone = far.alone()
+        yield from (alone for _ in times[first:])
+        return
+    turbulence = AddedTurbulence(scene)
     if air is not None:
         dataset = open_air(air)
         require_within(dataset, times)
-        for time in times[first:]:
-            yield _volume(scene, dataset, time, turbulence)
-        return
-    grid = scene.grid.build()
-    kept = None if folder is None else checkpoints(scene, times, folder)
-    for state in _states(scene, times, progress, first, kept):
-        yield _volume(scene, to_dataset(grid, [state]), state.time, turbulence)
+        near = (_volume(scene, dataset, time, turbulence) for time in times[first:])
+    else:
+        grid = scene.require_heated().grid.build()
+        kept = None if folder is None else checkpoints(scene, times, folder)
+        states = _states(scene, times, progress, first, kept)
+        near = (_volume(scene, to_dataset(grid, [state]), state.time, turbulence) for state in states)
+    yield from near if far is None else (far.around(volume) for volume in near)
 
 
 def _volume(scene: Scene, dataset: xarray.Dataset, time: float, turbulence: AddedTurbulence) -> AirVolume:
@@ -181,10 +190,11 @@ def _states(
 ) -> Iterable[State]:
     from nigemizu.heat import convect, evolve
 
-    grid = scene.grid.build()
-    temperature = scene.initial.sample(grid)
+    heated = scene.require_heated()
+    grid = heated.grid.build()
+    temperature = heated.initial.sample(grid)
     common: dict[str, Any] = {
-        "ground": scene.ground,
+        "ground": heated.ground,
         "sides": scene.sides,
         "top": scene.top,
         "diffusivity": scene.diffusivity,
@@ -208,7 +218,8 @@ def _require_times(times: tuple[float, ...], scene: Scene) -> None:
 
 def _require_memory(scene: Scene, instants: int) -> None:
     """Refuse, before the first, instants that cannot be held: a temperature and an index in each cell."""
-    needed, at_hand = instants * int(np.prod(scene.grid.cells, dtype=object)) * 16, available_memory()
+    cells = int(np.prod(scene.require_heated().grid.cells, dtype=object))
+    needed, at_hand = instants * cells * 16, available_memory()
     if at_hand is not None and needed > at_hand:
         raise InputError(
             f"{instants} instants need {needed / 1e9:.1f} GB of memory, {at_hand / 1e9:.1f} GB are available",

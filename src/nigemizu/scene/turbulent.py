@@ -99,7 +99,7 @@ class AddedTurbulence:
 
         assert self._scene.turbulence is not None
         axes = (x, y, z[int(z[0] == 0.0) :])
-        grid = self._scene.grid.build()
+        grid = self._scene.require_heated().grid.build()
         if not all(
             a.shape == b.shape and np.allclose(a, b)
             for a, b in zip(axes, (grid.x, grid.y, grid.z), strict=True)

@@ -257,7 +257,7 @@ def measure_ray_by_ray(fan: Fan, count: int = 20, *, progress: ProgressMeter = S
 
 
 def _one_column(scene: Scene) -> list[int]:
-    return [4, 4, scene.grid.cells[2]]
+    return [4, 4, scene.require_heated().grid.cells[2]]
 
 
 def _panes(fan: Fan, count: int) -> Any:

@@ -170,7 +170,8 @@ def fluctuating_road(scene: Scene, nodes: tuple[int, int, int], seed: int = 0) -
     uneven = gaussian_filter(white, 1.0, mode="wrap")
     refractivity = uneven * (FLUCTUATION / uneven.std(dtype=np.float64) * (warmer - colder))[:, None, None]
     refractivity += mean[:, None, None]
-    x, y = np.linspace(*scene.grid.x, nx), np.linspace(*scene.grid.y, ny)
+    grid = scene.require_heated().grid
+    x, y = np.linspace(*grid.x, nx), np.linspace(*grid.y, ny)
     return AirVolume(x, y, z, refractivity, temperature)
 
 
