@@ -98,6 +98,14 @@ def test_wyoming_csv():
         read_sounding(CSV, time="2026-07-25 12:00")
 
 
+def test_wyoming_csv_of_an_unknown_place(tmp_path):
+    file = tmp_path / "air.csv"
+    file.write_text(CSV.read_text().replace(" 35.1", "-99.9").replace("-97.44", "-99.99"))
+    sounding = read_sounding(file)
+    assert sounding.place is None
+    assert sounding.height == pytest.approx(read_sounding(CSV).height, rel=2e-3, abs=0)  # gravity of 45°
+
+
 def test_unknown_place_of_a_station(tmp_path):
     file = changed(
         tmp_path,
@@ -105,6 +113,18 @@ def test_unknown_place_of_a_station(tmp_path):
         ("Latitude: 35.18 Longitude: -97.44", "Latitude: ******  Longitude: -9999.0"),
     )
     assert read_sounding(file).place is None
+
+
+def test_a_date_that_is_none(tmp_path):
+    with pytest.raises(InputError, match=r"no time of a sounding \(got '25 Jux 2026 12'\)"):
+        read_sounding(changed(tmp_path, NEW, ("25 Jul 2026", "25 Jux 2026")))
+
+
+def test_a_page_whose_leading_blanks_were_lost(tmp_path):
+    text = "\n".join(line.strip() for line in NEW.read_text().splitlines())
+    file = tmp_path / "stripped.txt"
+    file.write_text(text)
+    assert read_sounding(file).vapour_fraction == pytest.approx(read_sounding(NEW).vapour_fraction)
 
 
 def test_missing_elevation(tmp_path):

@@ -11,7 +11,7 @@ import numpy as np
 
 from nigemizu.errors import InputError
 
-__all__ = ["Label", "Wanted", "as_time", "chosen", "wanted"]
+__all__ = ["Label", "Wanted", "as_place", "as_time", "chosen", "wanted"]
 
 _NEAR: Final = 1.0
 """Degrees of arc within which a place is that of a station."""
@@ -117,20 +117,26 @@ def wanted(time: object, place: tuple[float, float] | None, station: str | int |
         No time, or no latitude and longitude.
     """
     when, whole_day = as_time(time) if time is not None else (None, False)
-    if place is not None:
-        try:
-            latitude, longitude = (float(part) for part in place)
-        except (TypeError, ValueError):
-            latitude = longitude = math.nan
-        if not (-90.0 <= latitude <= 90.0 and -360.0 <= longitude <= 360.0):
-            raise InputError(
-                "no place",
-                key="place",
-                value=place,
-                expected="(latitude, longitude) in degrees, north and east",
-            )
-        place = (latitude, longitude)
-    return Wanted(when, whole_day, place, None if station is None else str(station))
+    return Wanted(when, whole_day, place and as_place(place), None if station is None else str(station))
+
+
+def as_place(given: object) -> tuple[float, float]:
+    """Latitude and longitude in degrees.
+
+    Raises
+    ------
+    InputError
+        It is no place on Earth.
+    """
+    try:
+        latitude, longitude = (float(part) for part in given)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        latitude = longitude = math.nan
+    if not (-90.0 <= latitude <= 90.0 and -360.0 <= longitude <= 360.0):
+        raise InputError(
+            "no place", key="place", value=given, expected="(latitude, longitude) in degrees, north and east"
+        )
+    return latitude, longitude
 
 
 def chosen(labels: Sequence[Label], want: Wanted, file: str) -> int:

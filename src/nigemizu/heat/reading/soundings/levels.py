@@ -44,6 +44,7 @@ BELIEVABLE: Final = {
 SWINGS: Final = 50.0
 """m; how far a balloon may sink for a moment, of `Levels.sinks`."""
 
+_THINNEST: Final = 2000.0  # Pa, of the lowest level
 _FEWEST: Final = 3
 _STEEPEST: Final = 20.0
 """Most that the pressure falls from a level to the next, as a factor; beyond, units are mixed."""
@@ -148,6 +149,7 @@ def checked(levels: Levels, file: str) -> Levels:
     _require_believable(levels, file)
     levels = _with_height_or_pressure(_upwards(levels), file)
     _require_order(levels, file)
+    _require_dense(levels, file)
     levels = _merged(levels)
     if len(levels.rows) < _FEWEST:
         raise InputError(
@@ -171,7 +173,9 @@ def _require_believable(levels: Levels, file: str) -> None:
                 key=f"{levels.rows[index]}, {name}",
                 value=levels.text(name, index),
                 expected=words,
-                remedy="look at its unit" if name not in ("wind_speed", "wind_direction") else None,
+                remedy="look at its unit; without one, values are SI"
+                if name not in ("wind_speed", "wind_direction")
+                else None,
             )
 
 
@@ -240,6 +244,20 @@ def _require_order(levels: Levels, file: str) -> None:
                 remedy="sort the levels by height, or correct the one that is wrong",
             )
     _require_fit(levels, file)
+
+
+def _require_dense(levels: Levels, file: str) -> None:
+    """Refuses hectopascals that are taken for pascals, which no ratio of pressures betrays."""
+    known = np.flatnonzero(np.isfinite(levels.values["pressure"]))
+    if known.size and levels.values["pressure"][known[0]] < _THINNEST:
+        raise InputError(
+            "too little for the lowest level",
+            file=file,
+            key=f"{levels.rows[known[0]]}, pressure",
+            value=levels.text("pressure", int(known[0])),
+            expected=f"at least {_THINNEST:g} Pa there",
+            remedy="is it in hPa? then say so; without a unit, values are SI",
+        )
 
 
 def _require_one_unit(levels: Levels, known: NDArray[np.intp], file: str) -> None:

@@ -12,14 +12,16 @@ from pathlib import Path
 from typing import BinaryIO, Final
 
 from nigemizu.errors import InputError
+from nigemizu.heat.reading.soundings.measures import column_of
 
-__all__ = ["READABLE", "decoded", "kind_of", "opened"]
+__all__ = ["READABLE", "decoded", "kind_of", "names_columns", "opened"]
 
 READABLE: Final = (
     "a sounding of the University of Wyoming (TEXT:LIST or CSV), an IGRA v2 data file (.txt, .zip or .gz), "
     "columns of a model in netCDF or Zarr, or a table in CSV or TOML"
 )
 _HEAD: Final = 65536
+_LINES: Final = 50  # in which headings are looked for
 _ZARR: Final = ("zarr.json", ".zgroup", ".zmetadata")
 _MAGIC: Final = (
     (b"\xff\xd8\xff", "a JPEG picture", None),
@@ -38,7 +40,7 @@ _WYOMING: Final = re.compile(r"^[ \t]*PRES[ \t]+HGHT[ \t]+TEMP\b", re.MULTILINE)
 _WYOMING_CSV: Final = re.compile(
     r"^[ \t]*time,longitude,latitude,pressure_hPa,", re.MULTILINE | re.IGNORECASE
 )
-_TOML: Final = re.compile(r"""^\s*["']?[\w \[\]()%°/-]+["']?\s*=\s*[\["'\d]""", re.MULTILINE)
+_TOML: Final = re.compile(r"""^\s*["']?[\w \[\]()%°/-]+["']?\s*=\s*[\["'\d{tfni+-]""", re.MULTILINE)
 
 
 def kind_of(path: Path) -> str:
@@ -95,7 +97,7 @@ def _kind_of_text(text: str, file: str) -> str:
         return "wyoming"
     if _WYOMING_CSV.search(text):
         return "wyoming-csv"
-    if re.match(r"\s*<(!doctype|html|head|body|\?xml)\b", text, re.IGNORECASE):
+    if re.match(r"\s*<(!doctype|html|head|body)\b", text, re.IGNORECASE):
         raise InputError(
             "this is an HTML page"
             + (
@@ -108,18 +110,30 @@ def _kind_of_text(text: str, file: str) -> str:
             expected=READABLE,
             remedy="save the page that shows the table of levels, or copy the table into a text file",
         )
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    if lines and (_TOML.match(lines[0]) or re.fullmatch(r"\s*\[[\w.]+\]\s*", lines[0])):
+    lines = [line for line in text.splitlines() if line.strip()]
+    stated = [line for line in lines if not line.lstrip().startswith("#")]
+    if stated and (_TOML.match(stated[0]) or re.fullmatch(r"\s*\[[\w.]+\]\s*", stated[0])):
         return "toml"
-    if (
-        lines
-        and re.search(r"[,;\t]|\S\s{2,}\S|\S\s\S+\s\S", lines[0])
-        and any(re.match(r"[\s\"]*[-+]?[\d.]", line) for line in lines[1:4])
-    ):
+    if any(names_columns(line) for line in lines[:_LINES]) or _looks_like_table(stated[:4]):
         return "csv"
     raise InputError(
         "this is text, but no table of levels", file=file, value=_first_words(text), expected=READABLE
     )
+
+
+def names_columns(line: str) -> bool:
+    """Whether the line names two columns or more that are known."""
+    for mark in (r"[,;\t]", r"\s{2,}", r"\s+(?![\[(])"):
+        cells = re.split(mark, line.strip("# \t"))
+        if sum(column_of(cell) is not None for cell in cells) > 1:
+            return True
+    return False
+
+
+def _looks_like_table(lines: list[str]) -> bool:
+    """Whether numbers follow a line that is parted by something, so that it is worth saying what is amiss."""
+    parted = bool(lines) and re.search(r"[,;\t]|\S\s+\S+\s+\S", lines[0])
+    return bool(parted) and any(re.match(r"[\s\"]*[-+]?[\d.]", line) for line in lines[1:])
 
 
 def _first_words(text: str) -> str:

@@ -14,10 +14,10 @@ import numpy as np
 
 from nigemizu.errors import InputError
 from nigemizu.heat.reading.soundings import heights
-from nigemizu.heat.reading.soundings.choosing import Label, Wanted, as_time, chosen
-from nigemizu.heat.reading.soundings.levels import SWINGS, Levels, listed
+from nigemizu.heat.reading.soundings.choosing import Label, Wanted, as_place, as_time, chosen
+from nigemizu.heat.reading.soundings.levels import BELIEVABLE, SWINGS, Levels, listed
 from nigemizu.heat.reading.soundings.measures import UNITS, Column, column_of, nearest_names
-from nigemizu.heat.reading.soundings.sniffing import decoded, opened
+from nigemizu.heat.reading.soundings.sniffing import decoded, names_columns, opened
 
 __all__ = ["read_csv", "read_toml"]
 
@@ -91,6 +91,8 @@ def read_csv(path: Path, want: Wanted, *, wyoming: bool = False) -> Levels:
             facts.setdefault(_FACTS[plain], texts[0])
         elif heading:
             unused.append(heading)
+    if wyoming and re.match(r"\s*-99\.9", str(facts.get("latitude", ""))):
+        del facts["latitude"]  # so the archive writes that it does not know the place
     notes = (f"columns not used: {listed(unused, 8)}",) if unused else ()
     kind = "University of Wyoming, CSV" if wyoming else "CSV"
     named = [f"line {row}" for row, _ in rows]
@@ -111,7 +113,7 @@ def _facts_and_lines(text: str) -> tuple[dict[str, Any], list[tuple[int, str]]]:
             lines.append((row, line))
             continue
         told = line.lstrip("# \t")
-        comment = (row, told)
+        comment = (row, told) if names_columns(told) else comment
         name, mark, value = re.match(r"([^:=]*)([:=]?)(.*)", told).groups()  # type: ignore[union-attr]
         key = _FACTS.get(" ".join(name.lower().replace("_", " ").split()))
         if mark and key:
@@ -133,7 +135,7 @@ def _split(lines: list[tuple[int, str]], file: str) -> tuple[list[str], list[tup
     if mark:
         table = [[cell.strip() for cell in next(csv.reader([line], delimiter=mark))] for _, line in lines]
     else:
-        table = [line.split() for _, line in lines]
+        table = [re.split(r"\s+(?![\[(])", line.strip()) for _, line in lines]
         if len(table) > 1 and len(table[0]) != len(table[1]):
             table = [re.split(r"\s{2,}", line.strip()) for _, line in lines]
     headings, *rows = table
@@ -310,7 +312,10 @@ def _levels(
 def _from_surface(values: dict[str, Any], surface: float, ground: float | None) -> np.ndarray:
     """Pressures, unknown but for the lowest level, which stands a little above the ground."""
     tall = values["height"]
-    lowest = int(np.nanargmin(np.where(np.isfinite(values["temperature"]), tall, np.nan)))
+    usable = np.isfinite(values["temperature"]) & np.isfinite(tall)
+    if not usable.any():
+        return np.full(tall.size, np.nan)
+    lowest = int(np.argmin(np.where(usable, tall, np.inf)))
     above = tall[lowest] - (tall[lowest] if ground is None else ground)
     pressure = np.full(tall.size, np.nan)
     pressure[lowest] = surface * np.exp(-above / (heights.SCALE * values["temperature"][lowest]))
@@ -338,31 +343,33 @@ def _told(
     facts: dict[str, Any], file: str
 ) -> tuple[datetime | None, tuple[float, float] | None, str | None, float | None, float | None]:
     """Time, place, station, its height and the pressure there, as far as the file tells them."""
-    try:
-        time = as_time(facts["time"])[0] if "time" in facts else None
-    except InputError as error:
-        raise error.in_file(file) from None
-    place = None
     given = facts.get("place")
     if given is None and {"latitude", "longitude"} <= set(facts):
         given = (facts["latitude"], facts["longitude"])
     if isinstance(given, str):
         given = re.split(r"[,;\s]+", given.strip("[]() "))
     try:
-        if given is not None:
-            place = (float(given[0]), float(given[1]))
+        time = as_time(facts["time"])[0] if "time" in facts else None
+        place = None if given is None else as_place(given)
         numbers = {
-            name: _quantity(facts[name], unit)
+            name: _quantity(facts[name], name, unit)
             for name, unit in (("station_height", "height"), ("surface_pressure", "pressure"))
             if name in facts
         }
-    except (TypeError, ValueError, IndexError) as error:
-        raise InputError("not what it should be", file=file, value=str(error)) from error
+    except InputError as error:
+        raise error.in_file(file) from None
     station = str(facts["station"]) if "station" in facts else None
     return time, place, station, numbers.get("station_height"), numbers.get("surface_pressure")
 
 
-def _quantity(given: Any, name: str) -> float:
+def _quantity(given: Any, key: str, measure: str) -> float:
     number, _, units = str(given).strip().partition(" ")
-    factor, offset = UNITS[name].to_si(units, name, None)
-    return float(number) * factor + offset
+    factor, offset = UNITS[measure].to_si(units, key, None)
+    try:
+        value = float(number) * factor + offset
+    except ValueError:
+        value = float("nan")
+    low, high, words = BELIEVABLE[measure]
+    if not low <= value <= high:
+        raise InputError("not what it should be", key=key, value=given, expected=words)
+    return value

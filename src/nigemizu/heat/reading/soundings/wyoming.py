@@ -19,6 +19,7 @@ from nigemizu.heat.reading.soundings.sniffing import decoded, opened
 __all__ = ["read_wyoming"]
 
 _WIDTH: Final = 7
+_MONTHS: Final = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _TITLES: Final = (
     # 72357 OUN Norman Observations at 12Z 15 Apr 2010
     re.compile(r"^\s*(?P<station>\S.*?)\s+Observations at (?P<hour>\d\d)Z (?P<date>\d\d? \w{3} \d{4})"),
@@ -58,7 +59,7 @@ class _Section:
             return None
         return value if value > -9000.0 else None
 
-    def label(self) -> Label:
+    def label(self, file: str) -> Label:
         """What tells it from the others."""
         latitude, longitude = self.number("latitude"), self.number("longitude")
         place = None if latitude is None or longitude is None else (latitude, longitude)
@@ -66,12 +67,24 @@ class _Section:
         for name in ("station number", "station identifier"):
             if name in self.facts and self.facts[name] not in names:
                 names.append(self.facts[name])
-        time = None
-        if "hour" in self.facts:
-            time = datetime.strptime(f"{self.facts['date']} {self.facts['hour']}", "%d %b %Y %H")
-        elif "time" in self.facts:
-            time = datetime.strptime(self.facts["time"], "%y%m%d/%H%M")
-        return Label(time.replace(tzinfo=UTC) if time else None, tuple(names), place)
+        return Label(self._time(file), tuple(names), place)
+
+    def _time(self, file: str) -> datetime | None:
+        given = (
+            f"{self.facts['date']} {self.facts['hour']}" if "hour" in self.facts else self.facts.get("time")
+        )
+        if given is None:
+            return None
+        try:
+            if "hour" not in self.facts:
+                return datetime.strptime(given, "%y%m%d/%H%M").replace(tzinfo=UTC)
+            day, month, year, hour = given.split()
+            # Not by strptime, which reads the names of months in the language of the machine.
+            return datetime(int(year), _MONTHS.index(month.lower()) + 1, int(day), int(hour), tzinfo=UTC)
+        except ValueError:
+            raise InputError(
+                "no time of a sounding", file=file, value=given, expected="such as 12Z 15 Apr 2010"
+            ) from None
 
 
 def read_wyoming(path: Path, want: Wanted) -> Levels:
@@ -101,7 +114,7 @@ def read_wyoming(path: Path, want: Wanted) -> Levels:
     with opened(path) as stream:
         text = decoded(stream.read(), file)
     sections = _sections(text)
-    labels = [section.label() for section in sections]
+    labels = [section.label(file) for section in sections]
     index = chosen(labels, want, file)
     section, label = sections[index], labels[index]
     values, shown = _columns(section, file)
@@ -176,6 +189,7 @@ def _cells(section: _Section, line: str, row: int, file: str) -> list[str]:
     words = line.split()
     if len(words) == len(section.headings):
         return words
+    line = words[0].rjust(section.ends[0]) + line.lstrip()[len(words[0]) :]  # blanks lost at the left
     starts = [0, *section.ends[:-1]]
     cells = [line[first:last] for first, last in zip(starts, section.ends, strict=True)]
     # Numbers stand at the right of their columns; one that does not was cut, or has slipped.
