@@ -277,3 +277,33 @@ def test_years_of_soundings_are_listed_by_their_ends_and_neighbours(tmp_path):
         read_sounding(file, time="2026-07-09 12:00")
     with pytest.raises(InputError, match="28 soundings could be meant"):
         read_sounding(file)
+
+
+def test_pressures_rounded_to_a_tenth_near_the_burst_of_the_balloon(tmp_path):
+    # At 35 km 0.05 hPa are 60 m; of two levels 500 m apart the thickness is then wrong by up to a quarter.
+    head = "time,longitude,latitude,pressure_hPa,geopotential height_m,temperature_C"
+    height = np.arange(0.0, 36001.0, 65.0)
+    warmth = np.maximum(288.15 - 6.5e-3 * height, 216.65) + 1e-3 * np.maximum(height - 20000.0, 0.0)
+    thickness = np.diff(height) / (0.5 * (warmth[1:] + warmth[:-1]))
+    pressure = 1013.25 * np.exp(-np.concatenate([[0.0], np.cumsum(thickness)]) * 9.80665 / 287.053)
+    rows = [
+        f"2026-07-24 23:22:31, 0.0,45.0,{p:.1f},{h:.0f},{t - 273.15:.1f}"
+        for p, h, t in zip(pressure, height, warmth, strict=True)
+    ]
+    file = tmp_path / "flight.csv"
+    file.write_text("\n".join([head, *rows]))
+    sounding = read_sounding(file)
+    assert sounding.height[-1] > 35500.0
+    assert sounding.height.size < height.size  # some levels share their rounded pressure
+
+
+def test_two_temperatures_at_one_height_are_refused(tmp_path):
+    row = "  971.4    357   24.6   21.6"
+    text = LIST.read_text()
+    at = text.index(row, text.index(row) + 1)
+    file = tmp_path / "air.txt"
+    file.write_text(text[:at] + "  971.4    357   34.6   21.6" + text[at + len(row) :])
+    with pytest.raises(
+        InputError, match=r"line 13, temperature: two temperatures.*'34.6'.*24.6, as at line 12"
+    ):
+        read_sounding(file, time=NIGHT)

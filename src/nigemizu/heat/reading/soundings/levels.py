@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from itertools import pairwise
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -49,6 +50,8 @@ _FEWEST: Final = 3
 _STEEPEST: Final = 20.0
 """Most that the pressure falls from a level to the next, as a factor; beyond, units are mixed."""
 _MISFIT: Final = 0.1
+_ROUNDED: Final = 10.0  # Pa, of two pressures given to 0.1 hPa
+_APART: Final = 3.0  # K, of two reports of one level
 _CHECKED_OVER: Final = 500.0  # m; thinner layers are dominated by rounding
 
 
@@ -150,7 +153,7 @@ def checked(levels: Levels, file: str) -> Levels:
     levels = _with_height_or_pressure(_upwards(levels), file)
     _require_order(levels, file)
     _require_dense(levels, file)
-    levels = _merged(levels)
+    levels = _merged(levels, file)
     if len(levels.rows) < _FEWEST:
         raise InputError(
             f"only {counted(len(levels.rows), 'level')} can be used",
@@ -280,7 +283,8 @@ def _require_one_unit(levels: Levels, known: NDArray[np.intp], file: str) -> Non
 def _require_fit(levels: Levels, file: str) -> None:
     """Refuses heights that the weight of the air contradicts, over layers of at least 500 m."""
     both = np.flatnonzero(np.isfinite(levels.values["height"]) & np.isfinite(levels.values["pressure"]))
-    depth = -np.log(levels.values["pressure"][both])
+    pressure = levels.values["pressure"][both]
+    depth = -np.log(pressure)
     warm, tall = levels.values["temperature"][both], levels.values["height"][both]
     path = np.concatenate([[0.0], np.cumsum(0.5 * (warm[1:] + warm[:-1]) * np.diff(depth))]) * heights.SCALE
     base = 0
@@ -288,7 +292,9 @@ def _require_fit(levels: Levels, file: str) -> None:
         thick = max(path[top] - path[base], tall[top] - tall[base])
         if thick < _CHECKED_OVER:
             continue
-        if abs(path[top] - path[base] - (tall[top] - tall[base])) > _MISFIT * thick:
+        # Where the air is thin, the rounding of the pressure alone is a good part of a layer.
+        rounding = _ROUNDED / pressure[top] * heights.SCALE * warm[top]
+        if abs(path[top] - path[base] - (tall[top] - tall[base])) > _MISFIT * thick + rounding:
             raise InputError(
                 f"height and pressure contradict each other: {tall[top] - tall[base]:.0f} m from "
                 f"{levels.rows[both[base]]} to here, {path[top] - path[base]:.0f} m by the pressures",
@@ -301,7 +307,7 @@ def _require_fit(levels: Levels, file: str) -> None:
         base = top
 
 
-def _merged(levels: Levels) -> Levels:
+def _merged(levels: Levels, file: str) -> Levels:
     """Successive levels of the same pressure or the same height become their mean."""
     pressure, height = levels.values["pressure"], levels.values["height"]
     groups: list[list[int]] = []
@@ -313,6 +319,8 @@ def _merged(levels: Levels) -> Levels:
     doubled = [group for group in groups if len(group) > 1]
     if not doubled:
         return levels
+    for group in doubled:
+        _require_one_temperature(levels, group, file)
     spread = max(float(np.ptp(levels.values["temperature"][group])) for group in doubled)
     where = [levels.rows[index] for group in doubled for index in group[1:]]
     note = (
@@ -332,3 +340,19 @@ def _merged(levels: Levels) -> Levels:
 def _first_known(values: FloatArray) -> float:
     known = values[np.isfinite(values)]
     return float(known[0]) if known.size else float("nan")
+
+
+def _require_one_temperature(levels: Levels, group: list[int], file: str) -> None:
+    """Refuses two temperatures at one height: which of them is that of the air, nobody can tell."""
+    for before, here in pairwise(group):
+        height, temperature = levels.values["height"], levels.values["temperature"]
+        one_place = height[here] == height[before] or np.isnan(height[[here, before]]).any()
+        if one_place and abs(temperature[here] - temperature[before]) > _APART:
+            raise InputError(
+                "two temperatures at one level",
+                file=file,
+                key=f"{levels.rows[here]}, temperature",
+                value=levels.text("temperature", here),
+                expected=f"about {levels.text('temperature', before)}, as at {levels.rows[before]}",
+                remedy="leave one out, or give it a height of its own",
+            )
