@@ -124,7 +124,7 @@ def test_air_that_is_heated(run: Run, small: tuple[str, ...]) -> None:
         (["--table", "transfer", "--distance", "1km", "-e", "-90"], ["elevation", "-90", "-89 to 89"]),
         (["--table", "transfer", "--distance", "1km", "--wavelength", "1um"], ["--wavelength", "--set air."]),
         (["--table", "refraction", "-e", "91"], ["elevation", "91", "-90 to 90"]),
-        (["--table", "refraction", "--wavelength", "5um"], ["wavelength", "5e-06", "300e-9"]),
+        (["--table", "refraction", "--wavelength", "9e-6"], ["wavelength", "9e-06", "300e-9"]),
         (["--table", "refraction", "--wavelength", "blue"], ["--wavelength", "'blue'", "nm"]),
         (["--table", "refraction", "--distance", "1km"], ["--distance", "--table transfer"]),
         (["--table", "refraction", "-a", "3"], ["--azimuth", "all around"]),

@@ -189,10 +189,8 @@ def refraction_table(
     rays = refracted_rays(
         index,
         np.radians(apparent),
-        radius=index.radius,
-        top=index.top,
+        **index.limits(),
         observer_height=eye,
-        ground=index.ground,
         into_vacuum=True,
         tolerance=_TOLERANCE,
     )
@@ -203,13 +201,10 @@ def _elevations(index: SceneIndex, eye: float, asked: Iterable[float] | None) ->
     if asked is None:
         from nigemizu.trace import horizon
 
-        level = np.linspace(0.0, 90.0, _TENTHS)
-        dip = math.degrees(
-            float(np.nanmax(horizon(index, eye, radius=index.radius, ground=index.ground).dip))
-        ) if eye > index.ground else 0.0  # fmt: skip
-        steps = np.arange(1, int(dip * 10) + 1)
-        edge = [] if dip == 0.0 else [-dip]
-        return np.unique(np.concatenate([edge, -steps / 10, level]))
+        dips = horizon(index, eye, **index.limits()).dip if eye > index.ground else np.zeros(1)
+        dip = math.degrees(float(np.nanmax(dips, initial=0.0)))
+        below = [-dip, *(-np.arange(1, int(dip * 10) + 1) / 10)] if dip > 0.0 else []
+        return np.unique(np.concatenate([below, np.linspace(0.0, 90.0, _TENTHS)]))
     values = np.array(list(asked), dtype=np.float64)
     if not values.size or not np.all(np.abs(values) <= 90.0):
         wrong = None if not values.size else float(values[np.argmax(~(np.abs(values) <= 90.0))])

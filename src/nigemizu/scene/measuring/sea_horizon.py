@@ -154,7 +154,7 @@ def horizon_table(scene: Scene, heights: Iterable[float] | None = None) -> Horiz
             value=wrong,
             expected=f"metres from the ground at {index.ground:g} to below the top at {index.top:g}",
         )
-    seen = horizon(index, values, radius=index.radius, ground=index.ground)
+    seen = horizon(index, values, **index.limits())
     coefficient = refraction_coefficient(index, values, radius=index.radius)
     with np.errstate(divide="ignore"):
         effective = 1.0 / (1.0 - coefficient[:, 0])

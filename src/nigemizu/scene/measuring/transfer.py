@@ -31,6 +31,7 @@ _ERROR: Final = 2e-12  # of the distance, that heights may err by, where nothing
 _LEAST_ERROR: Final = 1e-8  # m … but this is always allowed
 _NOISE: Final = 4.0  # errors by which heights must differ to count as different
 _STEEPEST: Final = 89.0  # degrees
+_BESIDE_ONE: Final = 0.01  # degrees, over which folds are sought where one elevation was asked for
 _FARTHEST: Final = 2.5e6  # m
 
 
@@ -196,7 +197,8 @@ def _elevations(
                 value=wrong,
                 expected=f"degrees from -{_STEEPEST:g} to {_STEEPEST:g}",
             )
-        return values, (float(values.min()), float(values.max()))
+        low, high = float(values.min()), float(values.max())
+        return values, (low, high) if low < high else (low - _BESIDE_ONE, high + _BESIDE_ONE)
     camera = scene.camera
     middle = math.degrees(math.asin(camera.direction[2]))
     half = math.degrees(math.atan(camera.height / 2 * camera.pixel_angle))

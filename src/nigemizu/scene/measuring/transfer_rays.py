@@ -24,6 +24,8 @@ FloatArray: TypeAlias = NDArray[np.float64]
 _STEPS: Final = 200_000
 _LEVEL: Final = 1e-9  # cosine of the elevation below which a ray never comes to the plane
 _AT_GROUND: Final = 1e-9  # of the way, that a hit on the ground may lie before the plane
+_CHORDS: Final = 30.0  # tolerances, that a chord may lie from its ray
+_SHARE: Final = 0.1  # of the tolerance, for steps: they know of their own errors only
 
 
 class Arrivals(NamedTuple):
@@ -139,9 +141,12 @@ def flight_through(
 
     Notes
     -----
-    The share of the tolerance that the steps may use up is `tolerance`/`distance` as an angle at the eye, and
-    the chords on which crossings are looked for have as much.
+    The steps may use up the tolerance, as an angle at the eye. The chords on which the plane and the ground
+    are looked for may lie 30 times as far from the ray; where it crosses the plane is found on the ray
+    itself, by following it once more, for as long as the chords say.
     """
+    import drjit as dr
+
     from nigemizu import trace
 
     types = through.types
@@ -155,15 +160,14 @@ def flight_through(
         ahead = types.Array3f(*(types.Float(np.ascontiguousarray(way)) for way in ways))
         origin = types.Array3f(*(types.Float(np.full(elevation.shape, place)) for place in eye))
         if method == "bent":
+            steps: dict[str, Any] = {"accuracy": _SHARE * angle, "max_steps": _STEPS}
             end = trace.march(
-                through,
-                origin,
-                ahead,
-                accuracy=angle,
-                chord_tolerance=angle,
-                max_steps=_STEPS,
-                surface=surface,
+                through, origin, ahead, surface=surface, chord_tolerance=_CHORDS * angle, **steps
             )
+            # The same once more without chords, just as far: onto the ray itself.
+            arrived = end.hit & (_along(end.position, eye, level) >= distance * (1 - _AT_GROUND))
+            there = trace.march(through, origin, ahead, max_distance=end.path_length, active=arrived, **steps)
+            end.position = dr.select(arrived, _onto(there, eye, level, distance), end.position)
         elif method == "panes":
             end = trace.cross_layers(through, origin, ahead, max_crossings=_STEPS, surface=surface)
         else:
@@ -193,11 +197,25 @@ def _arrivals(
             value=distance,
             remedy="take it nearer, or smoother air",
         )
-    along = (position[0] - eye[0]) * level[0] + (position[1] - eye[1]) * level[1]
+    along = _along(position, eye, level)
     hit = status == trace.HIT
     arrived = hit & (along >= distance * (1 - _AT_GROUND))
     height = np.where(arrived & (position[2] <= top), position[2], np.nan)
     return Arrivals(height, np.where(hit & ~arrived, along, np.nan))
+
+
+def _along(position: Any, eye: tuple[float, float, float], level: tuple[float, float]) -> Any:
+    """How far [m] positions lie before the eye, along the line of sight."""
+    return (position[0] - eye[0]) * level[0] + (position[1] - eye[1]) * level[1]
+
+
+def _onto(end: Any, eye: tuple[float, float, float], level: tuple[float, float], distance: float) -> Any:
+    """Ends near the plane taken onto it, along their directions."""
+    import drjit as dr
+
+    speed = end.direction[0] * level[0] + end.direction[1] * level[1]
+    short = distance - _along(end.position, eye, level)
+    return dr.fma(end.direction, short / dr.maximum(speed, _LEVEL), end.position)
 
 
 def _upright(types: Any, eye: tuple[float, float, float], level: tuple[float, float], distance: float) -> Any:
@@ -206,8 +224,7 @@ def _upright(types: Any, eye: tuple[float, float, float], level: tuple[float, fl
 
     def surface(origin: Any, direction: Any, length: Any, active: Any) -> tuple[Any, Any]:
         speed = direction.x * level[0] + direction.y * level[1]
-        gone = (origin.x - eye[0]) * level[0] + (origin.y - eye[1]) * level[1]
-        there = (types.Float(distance) - gone) / dr.maximum(speed, _LEVEL)
+        there = (types.Float(distance) - _along(origin, eye, level)) / dr.maximum(speed, _LEVEL)
         return active & (speed > _LEVEL) & (there > 0) & (there <= length), there
 
     return surface
