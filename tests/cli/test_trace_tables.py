@@ -64,7 +64,7 @@ def test_all_of_the_refraction_as_json_and_csv(run: Run, sea: str) -> None:
     rows = json.loads(done.out)["refraction"]
     with Path("table.csv").open() as file:
         table = list(csv.DictReader(file))
-    assert len(rows) == len(table) == 902  # every tenth of a degree, and the horizon of an eye at 10 m
+    assert len(rows) == len(table) == 911  # every tenth of a degree, hundredths below, the horizon
     assert list(rows[0]) == list(table[0])
     assert rows[0]["apparent_elevation_deg"] == pytest.approx(-5.55 / 60, abs=1e-3)
     assert {row["status"] for row in rows} == {"escaped"}
@@ -126,6 +126,10 @@ def test_air_that_is_heated(run: Run, small: tuple[str, ...]) -> None:
         (["--table", "refraction", "-e", "91"], ["elevation", "91", "-90 to 90"]),
         (["--table", "refraction", "--wavelength", "9e-6"], ["wavelength", "9e-06", "300e-9"]),
         (["--table", "refraction", "--wavelength", "blue"], ["--wavelength", "'blue'", "nm"]),
+        (
+            ["--table", "refraction", "--wavelength", "400nm", "--set=air.model='lehn1978'"],
+            ["air.model", "'lehn1978'", "ciddor1996"],
+        ),
         (["--table", "refraction", "--distance", "1km"], ["--distance", "--table transfer"]),
         (["--table", "refraction", "-a", "3"], ["--azimuth", "all around"]),
         (["--table", "horizon", "--height", "-1"], ["height", "-1", "ground at 0"]),

@@ -39,6 +39,8 @@ _MINUTES: Final = 60 * 180 / np.pi
 _SECONDS: Final = 60 * _MINUTES
 _BEYOND: Final = 1.8  # greatest height that is drawn, in heights of all images but the uppermost
 _LEVELS: Final = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 45.0, 90.0)  # degrees that are named
+_SPAN: Final = 1.0 / 500.0  # of the greatest refraction, down to which it is drawn
+_NARROW: Final = 2.0  # degrees: elevations that reach no higher are drawn evenly, in minutes
 _INSET: Final = 10.0  # degrees, to which the inset reaches
 
 
@@ -171,7 +173,8 @@ def refraction_figure(
 
     Notes
     -----
-    Elevations are drawn evenly up to 1° and by their logarithm above, where refraction is all but a power.
+    Elevations are drawn evenly up to 1° and by their logarithm above, where refraction is all but a power;
+    those of a fan that ends below 2° evenly throughout, with all colours and without an inset.
     """
     target, kind = figure_file(path)
     if not np.any(np.isfinite(shown.refraction)):
@@ -305,41 +308,48 @@ def _name_branches(axes: Axes, kinds: set[bool]) -> None:
 
 def _draw_refraction(axes: Axes, shown: RefractionFigure) -> None:
     degrees = np.degrees(shown.elevation)
-    colours = _spectrum(shown.wavelength)
     middle = shown.refraction.shape[1] // 2
     chosen = np.isfinite(shown.refraction[:, middle]) & (shown.refraction[:, middle] > 0.0)
-    axes.plot(
-        degrees[chosen],
-        _MINUTES * shown.refraction[chosen, middle],
-        color=colours[middle] if len(colours) > 1 else _ERECT,
-        lw=2.0,
-    )
-    low = float(degrees[chosen].min())
-    axes.set_xscale("symlog", linthresh=1.0, linscale=0.7)
-    axes.set_yscale("log")
-    named = [level for level in _LEVELS if low <= level <= degrees[chosen].max()]
-    axes.set_xticks(named, [f"{level:g}" for level in named])
-    axes.set_xticks([], minor=True)
-    axes.set_xlim(low - 0.03 * (1.0 + abs(low)), max(float(degrees[chosen].max()), low + 1e-3))
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    low, high = float(degrees[chosen].min()), float(degrees[chosen].max())
     axes.grid(color="#e4e7e9", lw=0.7)
     axes.set_axisbelow(True)
-    axes.set_xlabel("apparent elevation (°)")
     axes.set_ylabel("refraction (′)")
     axes.spines[["top", "right"]].set_visible(False)
-    begin = int(np.flatnonzero(chosen)[0])
-    axes.annotate(
-        f"{1e9 * shown.wavelength[middle]:.0f} nm",
-        (degrees[begin], _MINUTES * shown.refraction[begin, middle]),
-        xytext=(10, 6), textcoords="offset points", fontsize=8.5, color=_FAINT,
-    )  # fmt: skip
+    if high <= _NARROW:
+        _draw_near_horizon(axes, shown)
+        return
+    axes.plot(degrees[chosen], _MINUTES * shown.refraction[chosen, middle], color=_ERECT, lw=2.0)
+    axes.set_xscale("symlog", linthresh=1.0, linscale=0.7)
+    axes.set_yscale("log")
+    highest = _MINUTES * float(shown.refraction[chosen, middle].max())
+    axes.set_ylim(_SPAN * highest, 1.6 * highest)
+    named = [level for level in _LEVELS if low <= level <= high]
+    axes.set_xticks(named, [f"{level:g}" for level in named])
+    axes.set_xticks([], minor=True)
+    axes.set_xlim(low - 0.03 * (1.0 + abs(low)), high)
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_xlabel("apparent elevation (°)")
+    words = f"{1e9 * shown.wavelength[middle]:.0f} nm"
+    axes.annotate(words, (0.98, 0.95), xycoords="axes fraction", ha="right", va="top", color=_FAINT)
     if len(shown.wavelength) > 1:
-        _draw_dispersion(axes, shown, colours, middle)
+        _draw_dispersion(axes, shown, _spectrum(shown.wavelength), middle)
+
+
+def _draw_near_horizon(axes: Axes, shown: RefractionFigure) -> None:
+    """All colours, evenly: where the air lifts the horizon, curves do what they will."""
+    several = len(shown.wavelength) > 1
+    colours = _spectrum(shown.wavelength) if several else [_ERECT]
+    for length, curve, colour in zip(shown.wavelength, shown.refraction.T, colours, strict=True):
+        axes.plot(
+            _MINUTES * shown.elevation, _MINUTES * curve, color=colour, lw=1.6, label=f"{1e9 * length:.0f} nm"
+        )
+    axes.set_xlabel("apparent elevation (′)")
+    axes.legend(frameon=False)
 
 
 def _draw_dispersion(axes: Axes, shown: RefractionFigure, colours: list[Any], middle: int) -> None:
     """By how many seconds each colour is lifted more than the middle one, near the horizon."""
-    inset = axes.inset_axes((0.09, 0.11, 0.44, 0.42))
+    inset = axes.inset_axes((0.075, 0.1, 0.46, 0.47))
     degrees = np.degrees(shown.elevation)
     near = degrees <= _INSET if np.any(degrees <= _INSET) else np.ones(len(degrees), dtype=bool)
     for number, length in enumerate(shown.wavelength):

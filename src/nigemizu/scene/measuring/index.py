@@ -22,6 +22,7 @@ FloatArray: TypeAlias = NDArray[np.float64]
 
 _SHORTEST: Final = 300e-9  # m, for which the laws of refraction hold
 _LONGEST: Final = 1700e-9
+_COLOURLESS: Final = ("gladstone-dale", "lehn1978")
 
 
 @final
@@ -53,7 +54,7 @@ class SceneIndex:
         Raises
         ------
         InputError
-            It has no profile or a flat Earth; or a wavelength is out of range.
+            It has no profile or a flat Earth; a wavelength is out of range, or the law knows no colours.
         """
         from nigemizu.render import Ground
 
@@ -75,6 +76,13 @@ class SceneIndex:
             wrong = None if not lengths.size else float(lengths[np.argmin(fits)])
             raise InputError(
                 "no wavelength of light", key="wavelength", value=wrong, expected="metres, 300e-9 to 1.7e-6"
+            )
+        if scene.air.model in _COLOURLESS and not np.all(lengths == scene.air.wavelength):
+            raise InputError(
+                "this law of refraction is the same for all colours",
+                key="air.model",
+                value=scene.air.model,
+                remedy="take ciddor1996, or ask for air.wavelength alone",
             )
         far = FarAir.of(scene)
         grounds = [entry.height for entry in scene.objects if isinstance(entry, Ground)]

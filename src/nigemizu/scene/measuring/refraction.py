@@ -28,6 +28,7 @@ FloatArray: TypeAlias = NDArray[np.float64]
 _TENTHS: Final = 901  # of degrees, from the horizon to the zenith
 _SHOWN: Final = (0.0, 0.25, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0)
 _TOLERANCE: Final = 1e-10  # rad
+_JUST_ABOVE: Final = 1 - 1e-9  # of the dip
 _SECONDS: Final = 3600 * 180 / math.pi
 
 
@@ -160,8 +161,8 @@ def refraction_table(
     scene : Scene
         With a section ``[profile]`` and a round ``[earth]``.
     elevations : iterable of float, degrees, optional
-        Apparent. Every tenth of a degree from 0° to 90° unless given, and below 0° down to the horizon of an
-        eye that stands high.
+        Apparent. Every tenth of a degree from 0° to 90° unless given, and below 0° every hundredth down to
+        the horizon of an eye that stands high.
     wavelengths : iterable of float, m, optional
         In vacuum; that of ``air.wavelength`` unless given.
 
@@ -203,7 +204,7 @@ def _elevations(index: SceneIndex, eye: float, asked: Iterable[float] | None) ->
 
         dips = horizon(index, eye, **index.limits()).dip if eye > index.ground else np.zeros(1)
         dip = math.degrees(float(np.nanmax(dips, initial=0.0)))
-        below = [-dip, *(-np.arange(1, int(dip * 10) + 1) / 10)] if dip > 0.0 else []
+        below = [-dip * _JUST_ABOVE, *(-np.arange(1, int(dip * 100) + 1) / 100)] if dip > 0.0 else []
         return np.unique(np.concatenate([below, np.linspace(0.0, 90.0, _TENTHS)]))
     values = np.array(list(asked), dtype=np.float64)
     if not values.size or not np.all(np.abs(values) <= 90.0):
