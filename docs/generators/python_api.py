@@ -10,7 +10,7 @@ from generators.text import heading, write_if_changed
 
 __all__ = ["ROOMS", "write"]
 
-ROOMS = ("air", "heat", "field", "trace", "render", "output", "measure", "scene")
+ROOMS = ("air", "heat", "field", "trace", "render", "output", "measure", "scene", "scene.measuring")
 
 
 def write(folder: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import xarray
 
 Run = Callable[..., Any]
 
@@ -103,6 +104,42 @@ def test_files_of_a_transfer_curve(run: Run, sea: str, name: str) -> None:
     done = run("trace", sea, "--table", "transfer", "--distance", "5km", "-o", name)
     assert (done.code, done.out, done.err) == (0, f"{name}\n", "")
     assert Path(name).stat().st_size > 1000
+
+
+@pytest.mark.parametrize("name", ["stars.nc", "stars.json", "stars.svg", "stars.png"])
+def test_files_of_refraction(run: Run, sea: str, name: str) -> None:
+    done = run("trace", sea, "--table", "refraction", "--wavelength", "400nm,550nm,700nm", "-o", name)
+    assert (done.code, done.out, done.err) == (0, f"{name}\n", "")
+    if name.endswith(".nc"):
+        with xarray.open_dataset(name) as dataset:
+            assert dataset.sizes == {"elevation": 911, "wavelength": 3}
+            assert dataset["refraction"].attrs["units"] == "rad"
+            assert float(dataset["refraction"].max()) == pytest.approx(0.01, rel=0.1)
+    if name.endswith(".svg"):
+        drawn = Path(name).read_text(encoding="utf-8")
+        for words in ("refraction (′)", "lifted more than 550 nm (″)", "apparent elevation (°)"):
+            assert f"<!-- {words} -->" in drawn
+
+
+@pytest.mark.parametrize("name", ["dip.nc", "dip.json", "dip.csv"])
+def test_files_of_the_horizon(run: Run, sea: str, name: str) -> None:
+    done = run("trace", sea, "--table", "horizon", "-o", name)
+    assert (done.code, done.out, done.err) == (0, f"{name}\n", "")
+    if name.endswith(".nc"):
+        with xarray.open_dataset(name) as dataset:
+            assert dataset["dip"].sizes == {"height": 10}
+            assert "us1976" in dataset.attrs["nigemizu_scene"]
+    if name.endswith(".csv"):
+        assert Path(name).read_text().startswith("height,dip_arcmin,distance_km,geometric_dip_arcmin,")
+
+
+def test_near_the_horizon_all_colours_are_drawn(run: Run, sea: str) -> None:
+    typed = ("--wavelength", "400nm,700nm", "-e", "0:1:0.1", "-o", "low.svg")
+    assert run("trace", sea, "--table", "refraction", *typed).code == 0
+    drawn = Path("low.svg").read_text(encoding="utf-8")
+    for words in ("400 nm", "700 nm", "apparent elevation (′)"):
+        assert f"<!-- {words} -->" in drawn
+    assert "lifted more" not in drawn
 
 
 def test_air_that_is_heated(run: Run, small: tuple[str, ...]) -> None:

@@ -192,11 +192,8 @@ def test_trace_writes_tables_and_diagrams(run: Run, small: tuple[str, ...]) -> N
 def test_scenes_lists_the_built_in_ones(run: Run) -> None:
     done = run("scenes")
     assert [line.split()[0] for line in done.out.splitlines()] == [
-        "plume",
-        "pyramid",
-        "road",
-        "runway",
-        "shimmer",
+        *("fata-morgana", "lake", "looming", "moonrise", "plume", "pyramid"),
+        *("road", "runway", "shimmer", "sunset-inferior", "sunset-mock"),
     ]
 
 

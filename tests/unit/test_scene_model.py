@@ -14,7 +14,10 @@ from nigemizu.scene import Scene, builtin_scenes
 from nigemizu.scene.times import TimeSpec
 from nigemizu.values import Value, field_unit
 
-NAMES = ("plume", "pyramid", "road", "runway", "shimmer")
+NAMES = (
+    *("fata-morgana", "lake", "looming", "moonrise", "plume", "pyramid", "road", "runway", "shimmer"),
+    *("sunset-inferior", "sunset-mock"),
+)
 
 
 def _values(annotation: Any, found: set[type[Value]]) -> set[type[Value]]:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from nigemizu.air import Atmosphere
-from nigemizu.scene import Scene
+from nigemizu.scene import Scene, builtin_scenes
 from nigemizu.trace import Tracer
 from nigemizu.units import accepted_units
 from nigemizu.values import Value, field_unit
@@ -50,6 +50,7 @@ SHARES = {
     "Turbulence.exponent",
     "Turbulence.outer_scale_per_height",
     "Wind.exponent",
+    "Water.colour",
 }
 OF_THE_QUANTITY = {
     "Daily.amplitude",
@@ -143,9 +144,7 @@ def test_units_are_shown() -> None:
 
 
 def test_descriptions_are_words_not_markup() -> None:
-    texts = [
-        Scene.load(name).to_toml(comments=True) for name in ("plume", "pyramid", "road", "runway", "shimmer")
-    ]
+    texts = [Scene.load(name).to_toml(comments=True) for name in builtin_scenes()]
     remarks = [line.split("  # ")[1] for text in texts for line in text.splitlines() if "  # " in line]
     assert len(remarks) > 100
     assert [remark for remark in remarks if any(mark in remark for mark in ("\\", ":math:", "``", "$"))] == []
@@ -160,4 +159,4 @@ def test_units_are_known() -> None:
         if (unit := field_unit(field)) is not None
     }
     alone = {unit for unit in units if len(accepted_units(unit)) == 1}
-    assert alone == {"J/kg/K", "K/m", "K2 m-2/3", "W/m2/K", "kg/m3", "m-2/3", "m/s2"}
+    assert alone == {"DU", "degree/s", "J/kg/K", "K/m", "K2 m-2/3", "W/m2/K", "kg/m3", "m-2/3", "m/s2"}

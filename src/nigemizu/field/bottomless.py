@@ -11,7 +11,8 @@ from nigemizu.field.cell import Cell
 
 __all__ = ["Bottomless"]
 
-_NEAR: Final = 1e-7  # of the volume's height
+_NEAR: Final = 1e-7  # of the volume's height,
+_HIGH: Final = 10.0  # m, or of this: of air that reaches up to space the lowest layer may be thinner than a mm
 
 
 @final
@@ -36,7 +37,7 @@ class Bottomless(BoxedField):
         self._field = field
         self._floor = floor
         # As near to the floor as this, a ray is on the side that it moves to.
-        self._near = _NEAR * max(upper[2] - floor, 0.0) if upper[2] < float("inf") else _NEAR
+        self._near = _NEAR * min(max(upper[2] - floor, 0.0), _HIGH)
 
     @property
     def stratified(self) -> bool:

@@ -38,6 +38,7 @@ _STYLE: Final[Any] = {
 _MINUTES: Final = 60 * 180 / np.pi
 _SECONDS: Final = 60 * _MINUTES
 _BEYOND: Final = 1.8  # greatest height that is drawn, in heights of all images but the uppermost
+_ROOM: Final = 0.25  # of the width, that the words at a fold take up
 _LEVELS: Final = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 45.0, 90.0)  # degrees that are named
 _SPAN: Final = 1.0 / 500.0  # of the greatest refraction, down to which it is drawn
 _NARROW: Final = 2.0  # degrees: elevations that reach no higher are drawn evenly, in minutes
@@ -58,7 +59,8 @@ class TransferFigure:
         NaN where the ray does not come to the object.
     straight : (n,) float64, m
         The same without air.
-    folds : sequence of (float, float), rad and m
+    folds : sequence of (float, float, bool), rad and m
+        Elevation, height, and whether it is the lowest near there.
     bands : sequence of (float, float, bool), rad
         Edges of each image, and whether it is erect.
     profile : Profile, optional
@@ -72,7 +74,7 @@ class TransferFigure:
     elevation: FloatArray
     height: FloatArray
     straight: FloatArray
-    folds: Sequence[tuple[float, float]]
+    folds: Sequence[tuple[float, float, bool]]
     bands: Sequence[tuple[float, float, bool]]
     profile: Profile | None = None
     eye: float | None = None
@@ -203,7 +205,7 @@ def _window(shown: TransferFigure) -> tuple[float, float, float, float]:
     if len(shown.bands) > 1:
         # All but the uppermost image, which goes on into the sky.
         folded = np.isfinite(shown.height) & (shown.elevation <= shown.bands[-1][0])
-        ends = [height for _, height in shown.folds] + shown.height[folded].tolist()
+        ends = [height for _, height, _ in shown.folds] + shown.height[folded].tolist()
         high = min(high, low + _BEYOND * max(max([*ends, shown.eye or low]) - low, 1e-3 * (high - low)))
     inside = np.isfinite(shown.height) & (shown.height <= high)
     seen = shown.elevation[inside]
@@ -255,16 +257,19 @@ def _draw_transfer(axes: Axes, shown: TransferFigure, window: tuple[float, float
             zorder=4,
             solid_capstyle="butt",
         )
-    for elevation, height in shown.folds:
+    for elevation, height, lowest in shown.folds:
         if not (bottom <= elevation <= top and left <= height <= right):
             continue
         axes.plot(height, _MINUTES * elevation, "o", ms=5, mfc="white", mec=_INK, mew=1.4, zorder=6)
+        # The curve goes on to the right of its lowest.
+        aside = lowest and height - left > _ROOM * (right - left)
         words = f"fold {_MINUTES * elevation:.2f}′, {_metres(height)}".replace("-", "−")
         axes.annotate(
             words,
             (height, _MINUTES * elevation),
             gid=words,
-            xytext=(8, 0),
+            xytext=(-8, 0) if aside else (8, 0),
+            ha="right" if aside else "left",
             textcoords="offset points",
             va="center",
             fontsize=8.5,
@@ -273,11 +278,11 @@ def _draw_transfer(axes: Axes, shown: TransferFigure, window: tuple[float, float
         )
     axes.set_xlim(left, right)
     axes.set_ylim(_MINUTES * bottom, _MINUTES * top)
-    lowest = min((low for low, _, _ in shown.bands), default=bottom)
-    if lowest > bottom:
-        axes.axhspan(_MINUTES * bottom, _MINUTES * lowest, color=_GROUND, lw=0, alpha=0.7, zorder=1)
+    foot = min((low for low, _, _ in shown.bands), default=bottom)
+    if foot > bottom:
+        axes.axhspan(_MINUTES * bottom, _MINUTES * foot, color=_GROUND, lw=0, alpha=0.7, zorder=1)
         axes.annotate(
-            "the ground hides the object", (0.99, _MINUTES * lowest), xycoords=("axes fraction", "data"),
+            "the ground hides the object", (0.99, _MINUTES * foot), xycoords=("axes fraction", "data"),
             xytext=(0, -3), textcoords="offset points", ha="right", va="top", fontsize=8.5, color="#4d3a1e",
         )  # fmt: skip
     axes.axhline(0.0, color=_FAINT, lw=0.8, ls=":", zorder=1.5)

@@ -179,19 +179,17 @@ class Colours:
 
     def _bodies(self, band: int) -> list[Disc]:
         from nigemizu.render.heavens import Disc
-        from nigemizu.render.sun import SUN_RADIUS, limb_darkening, moon_reflectance
+        from nigemizu.render.sun import SUN_RADIUS, moon_radiance, sun_radiance
 
-        wavelength, distance = self.wavelength(band), np.linspace(0, 1, _RINGS)
-        mu = np.sqrt(1 - distance**2)
-        # Where a white surface facing the Sun has radiance 1, the Sun has 1 over its solid angle/π.
-        radiance = np.asarray(limb_darkening(mu, wavelength)) / math.sin(SUN_RADIUS) ** 2
+        wavelength = self.wavelength(band)
+        radiance = sun_radiance(np.linspace(0, 1, _RINGS), wavelength)[0]
         azimuth, elevation = (
             math.radians(part) for part in (self.light.sun_azimuth, self.light.sun_elevation)
         )
         found = [Disc(_direction(azimuth, elevation), SUN_RADIUS, radiance)]
         if self.light.moon is not None:
             moon = self.light.moon
-            bright = np.full(_RINGS, float(moon_reflectance(wavelength)))
+            bright = np.full(_RINGS, float(moon_radiance(wavelength, math.radians(moon.phase_angle))))
             towards = _direction(math.radians(moon.azimuth), math.radians(moon.elevation))
             found.append(Disc(towards, math.radians(moon.diameter / 2), bright, _lit(moon, towards)))
         return found
@@ -205,8 +203,8 @@ class Colours:
         if below > 0 and self.light.moon is None:
             warnings.warn(
                 f"light.sun_elevation: at {self.light.sun_elevation:g} degrees all of the Sun is "
-                f"{math.degrees(below):.2f} degrees below the visible horizon, which shows what stands higher "
-                f"than {math.degrees(lowest):.2f} degrees; the picture is of twilight",
+                f"{math.degrees(below):.2f} degrees below the visible horizon, where one sees what stands "
+                f"higher than {math.degrees(lowest):.2f} degrees; the picture is of twilight",
                 NigemizuWarning,
                 stacklevel=5,
             )

@@ -204,7 +204,7 @@ class TransferCurve:
             elevation=self.fan[0],
             height=self.fan[1],
             straight=self.fan[2],
-            folds=[(fold.elevation, fold.height) for fold in self.folds],
+            folds=[(fold.elevation, fold.height, fold.kind == "lowest") for fold in self.folds],
             bands=[(band.low, band.high, band.erect) for band in self.bands],
             profile=profile,
             eye=eye,
