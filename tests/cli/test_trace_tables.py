@@ -51,7 +51,7 @@ def test_refraction_as_a_table(run: Run, sea: str) -> None:
     assert (done.code, done.err) == (0, "")
     lines = done.out.splitlines()
     assert lines[0] == "Sea: astronomical refraction, eye at 10 m"
-    assert lines[2].split() == ["apparent", "[°]", "400", "nm", "[″]", "700", "nm", "[″]", "true", "[°]"]
+    assert lines[2].split("  ") == ["apparent [°]", "400 nm [″]", "700 nm [″]", "true, 400 nm [°]"]
     assert len(lines) == 6
     zenith = lines[-1].split()
     assert [float(word) for word in zenith] == pytest.approx([90.0, 0.0, 0.0, 90.0], abs=1e-9)

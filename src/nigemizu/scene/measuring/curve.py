@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from nigemizu.scene.far_air import natural
 from nigemizu.scene.measuring.columns import FIGURES, SUFFIXES, Column, records, text_table, write_table
@@ -84,7 +84,7 @@ class TransferCurve:
     scene: Scene | None = None
     air: AirVolume | None = None
 
-    def count(self, height: float | FloatArray) -> NDArray[np.int64]:
+    def count(self, height: ArrayLike) -> NDArray[np.int64]:
         """How many images of each height [m] are seen."""
         return image_count(self.bands, height)
 

@@ -112,7 +112,8 @@ class RefractionTable:
             Column("refraction", _SECONDS * self.refraction[:, k], f"{1e9 * length:.4g} nm [″]", 3)
             for k, length in enumerate(self.wavelength)
         ]
-        columns.append(Column("true", self.true_elevation[:, 0], "true [°]", 6))
+        colour = f"true, {1e9 * self.wavelength[0]:.4g} nm [°]" if len(self.wavelength) > 1 else "true [°]"
+        columns.append(Column("true", self.true_elevation[:, 0], colour, 6))
         if np.any(self.status[rows] != 0):
             words = [_statuses()[code].name.lower() for code in self.status[:, 0]]
             columns.append(Column("status", np.array(words, dtype=object), "ray"))
@@ -181,6 +182,14 @@ def refraction_table(
     heated on a mesh is left out, and so is what differs along the line of sight. Rays end on the ground of
     the scene, or where the profile begins; what is left of the air at the top of the profile bends them
     once more.
+
+    Examples
+    --------
+    >>> from nigemizu.scene import Scene
+    >>> scene = Scene.from_toml('earth = {}\\nprofile = { kind = "us1976" }')
+    >>> table = refraction_table(scene, [0.0, 45.0], [550e-9])
+    >>> (np.degrees(table.refraction) * 3600).round(2).ravel().tolist()  # seconds of arc
+    [1980.24, 57.16]
     """
     from nigemizu.trace import refracted_rays
 

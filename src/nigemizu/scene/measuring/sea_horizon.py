@@ -138,6 +138,14 @@ def horizon_table(scene: Scene, heights: Iterable[float] | None = None) -> Horiz
     -----
     Bouguer's invariant, n r cos θ, of the ray that grazes the surface (`nigemizu.trace.horizon`), which is
     the scene's ground, or where the profile begins; the geometric dip is arccos((R + ground)/(R + h)).
+
+    Examples
+    --------
+    >>> from nigemizu.scene import Scene
+    >>> scene = Scene.from_toml('earth = {}\\nprofile = { kind = "us1976" }')
+    >>> table = horizon_table(scene, [10.0])
+    >>> round(float(np.degrees(table.dip[0])) * 60, 3), round(float(table.distance[0]) / 1e3, 2)
+    (5.55, 12.39)
     """
     from nigemizu.trace import horizon, refraction_coefficient
 

@@ -85,6 +85,17 @@ def transfer_curve(
     W. H. Lehn (1983), Inversion of superior mirage data to compute temperature profiles, J. Opt. Soc. Am. 73,
     1622–1625, doi:10.1364/JOSA.73.001622 (transfer characteristic); W. Tape (1985), The topology of mirages,
     Scientific American 252(6), 120–129.
+
+    Examples
+    --------
+    A ship 16 km away under a warm layer of air is seen three times between 14.8 and 18.7 m:
+
+    >>> from nigemizu.scene import Scene
+    >>> curve = transfer_curve(Scene.load("fata-morgana"), 16093.0)
+    >>> [(round(fold.height, 1), fold.kind) for fold in curve.folds]
+    [(18.7, 'highest'), (14.8, 'lowest')]
+    >>> curve.count([10.0, 16.0, 40.0]).tolist()
+    [1, 3, 1]
     """
     if not (math.isfinite(distance) and 0.0 < distance <= _FARTHEST):
         raise InputError(
