@@ -29,6 +29,43 @@ def test_matching_functions_make_equal_energy_white() -> None:
     assert FINE[np.argmax(matching_functions(FINE)[1])] == pytest.approx(555 * NM)
 
 
+@pytest.mark.parametrize(
+    ("temperature", "x", "y"),
+    [(2855.54, 0.44758, 0.40745), (5000.0, 0.3451, 0.3516), (6500.0, 0.3135, 0.3237)],
+)
+def test_matching_functions_place_black_bodies(temperature: float, x: float, y: float) -> None:
+    """Standard illuminant A (CIE 015), and the Planckian locus (Wyszecki and Stiles, Color Science, 1982)."""
+    body = FINE**-5 / np.expm1(1.4388e-2 / (FINE * temperature))
+    xyz = np.trapezoid(matching_functions(FINE) * body, FINE)
+    np.testing.assert_allclose(xyz[:2] / xyz.sum(), [x, y], atol=2e-4)
+
+
+def test_single_bands_have_the_hues_of_the_spectrum() -> None:
+    """Violet, green, red: along the spectral locus one goes once, clockwise, round the Sun's white."""
+    taken = bands(32)
+    seen = taken.wavelength < 690 * NM  # beyond, red stays the same
+    white = chromaticity(taken.rgb(np.ones(len(taken))))
+    way = chromaticity(taken.to_rgb[seen]) - white
+    angle = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+    inner = slice(2, None)  # violet, too, stays the same up to 420 nm
+    assert np.all(np.diff(angle[inner]) < 1e-3)
+    assert np.pi < angle[2] - angle[-1] < 2 * np.pi
+    assert [int(np.argmax(taken.to_rgb[np.argmin(np.abs(taken.wavelength - light * NM))]))
+            for light in (450, 530, 620)] == [2, 1, 0]  # fmt: skip
+
+
+def test_a_smooth_spectrum_needs_no_more_than_sixteen_bands() -> None:
+    """λ⁻⁴, λ⁴: 16 bands against 64 within 0.5 %, and 4 bands are not enough."""
+
+    def shown(count: int, power: int):
+        taken = bands(count)
+        return taken.rgb((taken.wavelength / (550 * NM)) ** power)
+
+    for power in (-4, 4):
+        np.testing.assert_allclose(shown(16, power), shown(64, power), rtol=0.005)
+        assert np.abs(shown(4, power) / shown(64, power) - 1).max() > 0.01
+
+
 def test_sunlight_has_luminance_one_and_the_colour_of_the_sun() -> None:
     """Chromaticity of the Sun outside the air: 5 770 K to 5 900 K, x = 0.322 to 0.327, y = 0.331 to 0.336."""
     for count in (4, 16, 64):
