@@ -23,7 +23,7 @@ ELEVATIONS: Final = 120
 AZIMUTHS: Final = 48
 
 _FINEST: Final = math.radians(0.05)  # over which the nodes of elevation are evenly spaced, above the horizon
-_PIECES: Final = 96  # of a line of sight
+_PIECES: Final = 160  # of a line of sight
 _NODE, _GROWTH = 25.0, 0.025  # m and 1: thickest layers at the ground, and their growth with the height
 
 _SUN_HEIGHTS: Final = 48
@@ -35,10 +35,11 @@ _LOWEST_SUN: Final = math.radians(-1.8)  # against the geometric horizon: bent r
 _SLICES: Final = 8  # of the Sun's disc
 
 _OFTEN_HEIGHTS: Final = 24
-_OFTEN_ELEVATIONS: Final = 64
-_OFTEN_SCALE: Final = math.radians(4.0)
-_OFTEN_RANGE: Final = (math.radians(-24.0), math.radians(90.0))
-_OFTEN_DIRECTIONS, _OFTEN_AZIMUTHS, _OFTEN_STEPS = 12, 6, 24
+_OFTEN_ELEVATIONS: Final = 72
+_OFTEN_SCALE: Final = math.radians(6.0)
+_OFTEN_RANGE: Final = (math.radians(-20.0), math.radians(90.0))
+_OFTEN_DIRECTIONS, _OFTEN_AZIMUTHS, _OFTEN_STEPS = 8, 8, 24  # directions above, and as many below
+_DARK: Final = 1e-40  # 1/sr
 _COLUMN: Final = 256  # heights at which scattering is tabulated
 
 
@@ -168,19 +169,29 @@ def firmament(
     depolarisation, of the aerosol by Henyey and Greenstein), ϖ the aerosol's albedo, Ψ the mean radiance of
     scattered light. S comes from bent rays: what is left, times the squeeze dθ/dθ_true by which refraction
     thins light, averaged over the Sun's disc, so that the Earth's shadow has its penumbra and its red fringe.
-    Ψ follows Hillaire: the mean over all directions of light that was scattered once (by true phase functions,
-    along straight rays, ground included), times 1/(1 − f), f the part of even light that is scattered again
-    before it gets out.
+    Ψ follows Hillaire: the mean over all directions of light that was scattered once (by true phase
+    functions, along straight rays, ground included), times 1/(1 − f), f the part of even light that is
+    scattered again before it gets out.
 
-    Limits: no polarisation; second and later scattering is even in all directions; the ground is lit by direct
-    sunlight alone; the colours share the middle one's lines of sight (but not their true elevations), and the
-    lines to the Sun know layers of no less than 25 m and 2.5 % of the height. Below −8° what is left is wrong.
+    Limits: no polarisation; second and later scattering is even in all directions; the ground is lit by
+    direct sunlight alone; the colours share the middle one's lines of sight (but not their true elevations),
+    and the lines to the Sun know layers of no less than 25 m and 2.5 % of the height. Below −8° what is left
+    is wrong.
 
     References
     ----------
     S. Hillaire, A scalable and production ready sky and atmosphere rendering technique, Comput. Graph. Forum
     39 (2020) 13, doi:10.1111/cgf.14050. S. Chandrasekhar (1960), Radiative Transfer, eq. 1-18-262
     (depolarisation). L. G. Henyey, J. L. Greenstein, Astrophys. J. 93 (1941) 70, doi:10.1086/144246.
+
+    Examples
+    --------
+    >>> z, R = np.linspace(0, 60e3, 121), 6371e3
+    >>> beta = 1.4e-5 * np.exp(-z / 8e3) * np.array([[[1.0]], [[0.0]], [[0.0]]])
+    >>> view = {"radius": R, "eye": 0.0, "sun_elevation": 0.5, "air": Extinction()}
+    >>> sky = firmament(z, np.exp(z / R), Coefficients(*beta), **view)
+    >>> float(sky.radiance[0, -1, 0].round(3))
+    0.028
     """
     sky = _Air.of(z, index, coefficients, radius, eye)
     if not math.radians(-8.001) <= sun_elevation <= math.pi / 2 + 1e-9:
@@ -315,7 +326,7 @@ def _sun_table(sky: _Air) -> tuple[FloatArray, tuple[float, float, float, float,
         coarse = _spread(low, _SUN_RAYS, 7.0)
         rays = column_rays(nodes, n, eye=eye, elevation=coarse, radius=sky.radius, coefficients=beta)
         wanted = above - math.acos(sky.radius / (sky.radius + h))
-        table[i] = _disc(coarse, rays.true_elevation[0], rays.depth, low, wanted)
+        table[i] = _disc(coarse, rays.true_elevation[0], rays.depth, wanted)
     grid = (float(ends[0]), (_SUN_ELEVATIONS - 1) / float(ends[1] - ends[0]), _SUN_SCALE, top, sky.radius)
     return table, grid
 
@@ -325,16 +336,14 @@ def _spread(low: float, count: int, power: float) -> FloatArray:
     return np.asarray(low + (math.pi / 2 - low) * np.sinh(np.linspace(0, power, count)) / math.sinh(power))
 
 
-def _disc(
-    apparent: FloatArray, true: FloatArray, depth: FloatArray, low: float, wanted: FloatArray
-) -> FloatArray:
+def _disc(apparent: FloatArray, true: FloatArray, depth: FloatArray, wanted: FloatArray) -> FloatArray:
     """What is left (n, K) of the Sun's light with its middle at true elevations `wanted` (n,).
 
     Light from each interval of apparent elevation is counted where it comes from, and the disc takes the
     difference of the running sum over each of its slices: rays may cross.
     """
     out = np.isfinite(true)
-    fine = _spread(low, _SUN_FINE, 4.0)
+    fine = _spread(float(apparent[out][0]), _SUN_FINE, 4.0)
     lift = np.interp(fine, apparent[out], (apparent - true)[out])
     middle = 0.5 * (fine[1:] + fine[:-1])
     place = middle - np.interp(middle, fine, lift)
@@ -358,16 +367,19 @@ def _often(
     scattering: tuple[float, float, float],
     multiple: bool,
 ) -> tuple[FloatArray, tuple[float, float, float]]:
-    """Mean radiance of scattered light, and how it is indexed (`skylight.gather`)."""
+    """Logarithm of the mean radiance of scattered light, and how it is indexed (`skylight.gather`)."""
     ends = np.arcsinh(np.array(_OFTEN_RANGE) / _OFTEN_SCALE)
     index = (float(ends[0]), (_OFTEN_ELEVATIONS - 1) / float(ends[1] - ends[0]), _OFTEN_SCALE)
     if not multiple:
-        return np.zeros((2, _OFTEN_ELEVATIONS, sky.bands)), index
+        return np.full((2, _OFTEN_ELEVATIONS, sky.bands), math.log(_DARK)), index
     top = grid[3]
     places = top * np.linspace(0, 1, _COLUMN) ** 2
     column = np.array([np.interp(places, sky.height, row) for row in sky.beta.reshape(-1, len(sky.z))])
     column = np.ascontiguousarray(column.reshape(3, sky.bands, _COLUMN).transpose(2, 0, 1))
-    mu, weight = np.polynomial.legendre.leggauss(_OFTEN_DIRECTIONS)
+    # Dense about the horizon, where most of the light is: the sine of the elevation is ±u².
+    u, weight = np.polynomial.legendre.leggauss(_OFTEN_DIRECTIONS)
+    u, weight = 0.5 * (u + 1), 0.5 * weight
+    mu, weight = np.concatenate([-(u**2), u**2]), np.tile(2 * u * weight, 2)
     found = skylight.isotropic(
         top * np.linspace(0, 1, _OFTEN_HEIGHTS) ** 2,
         _OFTEN_SCALE * np.sinh(np.linspace(ends[0], ends[1], _OFTEN_ELEVATIONS)),
@@ -381,4 +393,4 @@ def _often(
         sun,
         grid,
     )
-    return found, index
+    return np.log(np.maximum(found, _DARK)), index

@@ -218,9 +218,9 @@ def gather(  # type: ignore[no-untyped-def]
         Of the aerosol: share scattered and asymmetry; of molecules as in `rayleigh`.
     sun : (heights, elevations, K) float64
         As for `shine`, with ``sun_grid = (first, per_node, scale, top, radius)``.
-    often : (heights, elevations, K) float64, 1/sr
-        Mean radiance of light that was scattered before, with ``often_grid = (first, per_node, scale)``: the
-        Sun's elevation by its area hyperbolic sine.
+    often : (heights, elevations, K) float64
+        Logarithm of the mean radiance [1/sr] of light that was scattered before, with ``often_grid = (first,
+        per_node, scale)``: the Sun's elevation by its area hyperbolic sine.
     """
     many, pieces, wide = depths.shape[0], depths.shape[1], depths.shape[3]
     found = np.zeros((many, azimuths.size, wide))
@@ -257,7 +257,7 @@ def gather(  # type: ignore[no-untyped-def]
                 for k in range(wide):
                     low = often[i, j, k] + w * (often[i, j + 1, k] - often[i, j, k])
                     high = often[i + 1, j, k] + w * (often[i + 1, j + 1, k] - often[i + 1, j, k])
-                    more = low + v * (high - low)
+                    more = math.exp(low + v * (high - low))
                     found[e, a, k] += by_molecules[k] * (once * light[k] + more)
                     found[e, a, k] += by_aerosol[k] * (twice * light[k] + more)
     return found
