@@ -14,10 +14,11 @@ EARTH = Earth()
 R = EARTH.radius
 
 
-def _globe(eye: float) -> object:
+def _globe(eye: float, top: float = 86e3) -> object:
     from nigemizu.render.globe import Globe
 
-    return Globe(R, (0.0, 0.0, float(EARTH.conformal_height(eye))))
+    top = float(EARTH.conformal_height(top))
+    return Globe(R, (0.0, 0.0, float(EARTH.conformal_height(eye))), top)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +67,7 @@ def test_refraction_of_an_exponential_sphere() -> None:
     elevation = np.radians(90 - np.array([30, 60, 80, 89, 90]))
     ahead = types.Array3f(types.Float(np.cos(elevation)), 0, types.Float(np.sin(elevation)))
     end = trace.march(air, types.Array3f(0, 0, 1e-9), ahead, accuracy=1e-10, max_steps=20_000)
-    outward = np.asarray(_globe(0.0).outward(end.position, end.direction))  # type: ignore[attr-defined]
+    outward = np.asarray(_globe(0.0, 2e5).outward(end.position, end.direction))  # type: ignore[attr-defined]
     bending = (elevation - np.arctan2(outward[2], outward[0])) * 206264.80624709636
     expected = [
         34.47928647314355,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
 from typing import Any, Final, NamedTuple, final
 
@@ -158,7 +159,7 @@ class BucketAxis(Axis):
             raise InputError(
                 "the axis has cells too thin for single precision", remedy="use double precision"
             )
-        table, self._offset, self._shift, self.corrections = _best_table(stored)
+        table, self._offset, self._shift, self.corrections = _known_table(stored.tobytes(), stored.dtype.str)
         self._origin = float(stored[0])
         self._key = int(_key(np.float32(self._offset), self._shift))
         self.buckets = len(table)
@@ -233,6 +234,14 @@ def make_axis(nodes: ArrayLike, types: Types, *, key: str) -> Axis:
 def _key(raised: Any, shift: int) -> Any:
     """Leading bits of single-precision numbers."""
     return np.asarray(raised, dtype=np.float32).view(np.uint32) >> shift
+
+
+@functools.lru_cache(maxsize=8)
+def _known_table(nodes: bytes, dtype: str) -> tuple[NDArray[np.uint32], float, int, int]:
+    """`_best_table`, found once for the nodes that one air after the other has."""
+    found = _best_table(np.frombuffer(nodes, dtype=dtype))
+    found[0].flags.writeable = False
+    return found
 
 
 def _best_table(nodes: NDArray[Any]) -> tuple[NDArray[np.uint32], float, int, int]:

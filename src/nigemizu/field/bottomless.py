@@ -12,7 +12,9 @@ from nigemizu.field.cell import Cell
 __all__ = ["Bottomless"]
 
 _NEAR: Final = 1e-7  # of the volume's height,
-_HIGH: Final = 10.0  # m, or of this: of air that reaches up to space the lowest layer may be thinner than a mm
+_HIGH: Final = (
+    10.0  # m, or of this: of air that reaches up to space the lowest layer may be thinner than a mm
+)
 
 
 @final

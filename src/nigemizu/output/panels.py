@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nigemizu.errors import InputError
-from nigemizu.output.pictures import encoded, write_png
+from nigemizu.output.pictures import Highlights, encoded, write_png
 from nigemizu.output.provenance import Provenance
 
 __all__ = ["write_panels"]
@@ -20,7 +20,11 @@ _MARGIN: Final = 0.5  # of the letters' height, around the name
 
 
 def write_panels(
-    path: str | Path, panels: Sequence[tuple[str, ArrayLike]], *, provenance: Provenance | None = None
+    path: str | Path,
+    panels: Sequence[tuple[str, ArrayLike]],
+    *,
+    highlights: Highlights = "clip",
+    provenance: Provenance | None = None,
 ) -> Path:
     """Write labelled pictures as one PNG: wide ones one above the other, tall ones side by side.
 
@@ -30,6 +34,8 @@ def write_panels(
         ``.png``.
     panels : sequence of (str, (height, width, 3) array_like)
         Name and linear radiance of each picture.
+    highlights : {"clip", "soft", "film"}
+        As in `nigemizu.output.pictures.encoded`.
     provenance : Provenance, optional
         Kept in text chunks.
 
@@ -44,7 +50,7 @@ def write_panels(
     """
     from PIL import Image, ImageDraw, ImageFont
 
-    pictures = [(name, encoded(radiance)) for name, radiance in panels]
+    pictures = [(name, encoded(radiance, highlights=highlights)) for name, radiance in panels]
     shapes = {pixels.shape for _, pixels in pictures}
     if len(shapes) != 1:
         raise InputError("pictures of one size are needed", key="panels", value=sorted(shapes))

@@ -15,7 +15,7 @@ from nigemizu.output.provenance import Provenance
 
 __all__ = ["Highlights", "encoded", "read_picture", "write_exr", "write_picture", "write_png"]
 
-Highlights: TypeAlias = Literal["clip", "soft"]
+Highlights: TypeAlias = Literal["clip", "soft", "film"]
 _KNEE: Final = 0.8  # linear value above which soft highlights bend
 
 
@@ -30,8 +30,9 @@ def encoded(
         Linear red, green, blue with Rec. 709 primaries; 1 is white.
     exposure : float, stops
         The radiance is multiplied by 2^exposure.
-    highlights : {"clip", "soft"}
-        ``"clip"`` cuts at white; ``"soft"`` bends values above 0.8 towards it, with a continuous slope.
+    highlights : {"clip", "soft", "film"}
+        ``"clip"`` cuts at white; ``"soft"`` bends values above 0.8 towards it, with a continuous slope;
+        ``"film"`` bends all, so that what is far too bright goes through yellow to white.
 
     Returns
     -------
@@ -48,8 +49,8 @@ def encoded(
     Between two steps a pixel takes the upper one with the probability that keeps the mean: rounding to the
     nearest would draw contour lines into a smooth sky. The dither is a hash of row, column and channel, the
     same in every picture, so that films stay calm; what lies exactly on a step, as black and white do, stays
-    there. Soft: c → k + (1 − k)(1 − exp(−(c − k)/(1 − k))) above k = 0.8, per channel. Limits: an
-    exposure and a transfer curve, no film look and no gamut mapping.
+    there. Soft: c → k + (1 − k)(1 − exp(−(c − k)/(1 − k))) above k = 0.8, per channel. Film:
+    c → 1 − exp(−c), per channel. Limits: an exposure and a transfer curve, no gamut mapping.
 
     Examples
     --------
@@ -63,6 +64,8 @@ def encoded(
     if highlights == "soft":
         over = (linear - _KNEE) / (1.0 - _KNEE)
         linear = np.where(over > 0.0, _KNEE + (1.0 - _KNEE) * -np.expm1(-np.maximum(over, 0.0)), linear)
+    elif highlights == "film":
+        linear = -np.expm1(-linear)
     np.minimum(linear, 1.0, out=linear)
     curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
     curve[linear == 1.0] = 1.0  # which the formula misses by a rounding error

@@ -70,6 +70,9 @@ class Camera(Value):
     exposure : float, stops (EV)
         Each unit doubles the brightness. At 0, a white horizontal surface in full light comes out at 1. The
         aperture and the exposure time do not change it.
+    highlights : {"clip", "soft", "film"}
+        What becomes of what is brighter than white in a PNG or a film: cut off; bent towards white from 0.8
+        on; or, as on film, bent from the beginning, so that a low Sun goes through yellow to white.
     filter : {"box", "gaussian"}
         How the samples are put together to pixels. ``box`` is the quickest and leaves the samples of
         neighbouring pixels independent; ``gaussian`` is a little softer.
@@ -109,6 +112,7 @@ class Camera(Value):
     height: Annotated[int, Field(ge=1, le=16384)] = 540
     samples: Annotated[int, Field(ge=1, le=1_000_000)] = 64
     exposure: Annotated[float, Field(ge=-30, le=30)] = 0.0
+    highlights: Literal["clip", "soft", "film"] = "clip"
     filter: Filter = "box"
     seed: Annotated[int, Field(ge=0)] = 0
     diffraction: bool = False

@@ -26,6 +26,8 @@ class Globe:
         Of the Earth.
     eye : (x, y, z) float, m
         In the map.
+    top : float, m
+        Conformal height at which the air ends.
 
     Notes
     -----
@@ -34,6 +36,7 @@ class Globe:
 
     radius: float
     eye: tuple[float, float, float]
+    top: float
 
     def outward(self, position: Any, direction: Any) -> Any:
         """Direction in the eye's axes of light that has left the air.
@@ -42,7 +45,7 @@ class Globe:
         ----------
         position : Array3f, m
         direction : Array3f, 1
-            Both in the map.
+            Both in the map, at the top of the air or on the straight line with which a ray goes on there.
 
         Returns
         -------
@@ -50,7 +53,10 @@ class Globe:
             Turned down by the angle between the verticals, the distance over the radius.
         """
         Float, Array3f = type(position.x), type(direction)
-        x, y = position.x - Float(self.eye[0]), position.y - Float(self.eye[1])
+        # Above the air the map's lines are not those of the world: back to its top.
+        above = dr.maximum(position.z - Float(self.top), 0) / dr.maximum(direction.z, 1e-6)
+        x = position.x - direction.x * above - Float(self.eye[0])
+        y = position.y - direction.y * above - Float(self.eye[1])
         distance = dr.sqrt(dr.fma(x, x, y * y))
         inverse = dr.rcp(dr.maximum(distance, 1e-6))
         x, y = x * inverse, y * inverse

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, Self, final
 
 import numpy as np
@@ -27,7 +27,8 @@ __all__ = ["Colours"]
 FloatArray = NDArray[np.float64]
 
 _RINGS: Final = 256  # steps from the middle of a disc to its limb
-_MARGIN: Final = 2e-5  # rad, that the tables reach below the horizon
+_MARGIN: Final = 1e-7  # rad, by which the tables begin above the horizon
+_FLAT: Final = 1e11  # m, radius of a flat Earth
 _SEA: Final = 0.06  # albedo of the ground under the sky
 
 
@@ -75,24 +76,20 @@ class Colours:
         if scene.tracer.method == "straight":
             bare = np.zeros_like(bare)
         index = (1 + bare) * far.earth.stretch(z)
-        rayleigh, aerosol, ozone = light.extinction.coefficients(
-            heights, temperature, pressure, chosen.wavelength
-        )
+        coefficients = light.extinction.coefficients(heights, temperature, pressure, chosen.wavelength)
         at_eye = np.array([np.interp(eye, z, row) for row in index])
-        # The sea's horizon, or the lowest ray that a duct leaves.
-        low = -float(np.arccos(np.clip(index[:, 0] / at_eye, -1, 1)).max()) - _MARGIN
+        # The horizon: the ray that grazes the ground, or where n′ is least below the eye.
+        least = np.minimum(index[:, z <= eye].min(axis=1), at_eye)
+        low = -float(np.arccos(least / at_eye).min()) + _MARGIN
         elevation, azimuth = elevation_nodes(low), azimuth_nodes()
         made = firmament(
             z,
             index,
-            rayleigh,
-            aerosol,
-            ozone,
-            radius=None if far.earth.flat else far.earth.radius,
+            coefficients,
+            radius=_FLAT if far.earth.flat else far.earth.radius,
             eye=eye,
             sun_elevation=math.radians(light.sun_elevation),
-            aerosol_albedo=light.extinction.aerosol_albedo,
-            aerosol_asymmetry=light.extinction.aerosol_asymmetry,
+            air=light.extinction,
             ground_albedo=_SEA,
             elevation=elevation,
             azimuth=azimuth,
@@ -101,10 +98,10 @@ class Colours:
         colours = cls(
             light=light,
             bands=chosen,
-            firmament=made,
+            firmament=_filled(made),
             low=low,
             index=np.stack([at_eye, index[:, -1]], axis=1),
-            haze=np.stack([rayleigh[:, 0], aerosol[:, 0]], axis=1),
+            haze=np.stack([coefficients.rayleigh[:, 0], coefficients.aerosol[:, 0]], axis=1),
             scales=(float(heights[fall]), light.extinction.aerosol_height),
         )
         colours._warn_of_hidden_sun(elevation)
@@ -208,6 +205,16 @@ class Colours:
                 NigemizuWarning,
                 stacklevel=5,
             )
+
+
+def _filled(made: Firmament) -> Firmament:
+    """The same with the lowest rays, where some wavelengths meet the ground, as the next one that does not."""
+    parts = [made.radiance.copy(), made.transmission.copy(), made.true_elevation.copy()]
+    for band, clear in enumerate(made.transmission):
+        first = int(np.argmax(clear > 0))
+        for part in parts:
+            part[band, :first] = part[band, first]
+    return replace(made, radiance=parts[0], transmission=parts[1], true_elevation=parts[2])
 
 
 def _rising(true: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

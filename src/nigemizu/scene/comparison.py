@@ -40,8 +40,9 @@ def compare(
         method: scene.render(time, air=volume, method=method, variant=variant, progress=progress)
         for method in _methods(scene)
     }
-    panels = [(METHODS[method], picture.pixels) for method, picture in pictures.items()]
-    written = [write_panels(path, panels, provenance=Provenance(scene=scene.to_toml(), command=command))]
+    panels = [(METHODS[method], picture.shown) for method, picture in pictures.items()]
+    provenance = Provenance(scene=scene.to_toml(), command=command)
+    written = [write_panels(path, panels, highlights=scene.camera.highlights, provenance=provenance)]
     for method, picture in pictures.items():
         written.append(picture.save(path.with_stem(f"{path.stem}_{method}"), command=command))
     return written

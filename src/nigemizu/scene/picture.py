@@ -52,6 +52,15 @@ class RenderedPicture:
         """The picture (height, width, 3) without noise and not cut off at saturation: the ground truth."""
         return self.pixels if self.before_noise is None else self.before_noise
 
+    @property
+    def shown(self) -> NDArray[np.float32]:
+        """The picture with colours that a screen can show: light of single wavelengths lies outside."""
+        if self.scene.light.sky != "physical":
+            return self.pixels
+        from nigemizu.render.spectrum import into_gamut
+
+        return into_gamut(self.pixels).astype(np.float32)
+
     def save(self, path: str | os.PathLike[str], *, command: str = "") -> Path:
         """Write ``.png`` (8 bits, sRGB) or ``.exr`` (linear), whole or not at all, and return where it is.
 
@@ -63,7 +72,8 @@ class RenderedPicture:
 
         path = Path(path)
         provenance = Provenance(scene=self.scene.to_toml(), command=command)
-        written = write_picture(path, self.pixels, provenance=provenance)
+        shown = self.shown if path.suffix.lower() == ".png" else self.pixels
+        written = write_picture(path, shown, highlights=self.scene.camera.highlights, provenance=provenance)
         if self.truth is not None:
             self.truth.save(path.with_name(f"{path.stem}_truth"), command=command, figure=True)
         return written

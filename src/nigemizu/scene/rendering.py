@@ -54,8 +54,9 @@ class Studio:
             tracer = tracer.model_copy(update={"method": "bent"})  # in the map
         settings = Settings(tracer=tracer, visibility=scene.light.visibility)
         self._integrator = integrator(settings=settings)
-        if scene.earth is not None and scene.round:
-            self._integrator.globe = Globe(scene.earth.radius, self._camera.eye)
+        if scene.earth is not None and self._far is not None and scene.round:
+            top = float(scene.earth.conformal_height(self._far.profile.top))
+            self._integrator.globe = Globe(scene.earth.radius, self._camera.eye, top)
         self._colours: Colours | None = None
         self._built: Any = None
         self._light: Any = None
