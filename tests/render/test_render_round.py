@@ -31,7 +31,7 @@ def rows_of(picture: Any) -> np.ndarray[Any, Any]:
 
 @pytest.mark.parametrize("name", ["sunset-mock", "lake", "fata-morgana"])
 def test_shared_rays_meet_what_single_rays_meet(name: str) -> None:
-    """On a round Earth the ground comes nearer like a root below the horizon, not like 1/θ as on a flat one."""
+    """Over a round Earth the ground below the horizon comes nearer like a root, over a flat one like 1/θ."""
     narrow = {"camera__height": 540, "camera__field_of_view": 16 / 960, "camera__samples": 1}
     shared = scene(name, **narrow, **{"light__sky": "sunsky", "light__sun_elevation": 40.0}).render()
     single = shared.scene.with_changes({"tracer.sharing": False}).render()
@@ -136,3 +136,53 @@ def test_a_sun_that_has_set_is_told() -> None:
     small = {"camera.width": 8, "camera.height": 8, "camera.samples": 4, "light.wavelengths": 4}
     with pytest.warns(NigemizuWarning, match="below the visible horizon"):
         Scene.load("sunset-inferior", {**small, "light.sun_elevation": -3.0}).render()
+
+
+def test_data_that_end_below_what_is_looked_at() -> None:
+    table = {"kind": "table", "heights": [0.0, 20.0], "temperatures": [280.0, 281.0]}
+    with pytest.raises(InputError, match=r"ends at 20 m, below what is 25 m high"):
+        FarAir.of(Scene.load("moonrise", {"profile": table, "camera.eye": [0.0, 0.0, 25.0]}))
+    hills = {"kind": "hills", "distance": 9000.0, "height": 90.0}
+    with pytest.raises(InputError, match=r"objects\.0"):
+        FarAir.of(Scene.load("moonrise", {"profile": table, "objects": [hills]}))
+    FarAir.of(Scene.load("moonrise", {"profile": table}))
+
+
+def test_places_by_distance_bearing_and_height() -> None:
+    box = {"kind": "box", "position": {"distance": "2 km", "bearing": 60.0, "height": 5.0}}
+    placed = Scene.load("moonrise", {"objects": [box]}).objects[0]
+    np.testing.assert_allclose(placed.position, [2000 * np.sin(np.pi / 3), 1000.0, 5.0])  # type: ignore[union-attr]
+    for wrong, word in (
+        ({"distnce": 3.0}, "distance"),
+        ({"bearing": 3.0}, "distance"),
+        ({"distance": -1.0}, "0"),
+    ):
+        with pytest.raises((InputError, ValueError), match=word):
+            Scene.load("moonrise", {"objects": [{**box, "position": wrong}]})
+
+
+def test_a_hot_road_under_layers_bends_near_by_and_far_away() -> None:
+    """The mesh's mirage stays, and what leaves the air is lifted by the refraction of all of it."""
+    changes = {
+        "earth": {}, "profile": {"kind": "us1976", "surface_temperature": 309.0}, "grid.cells": [8, 4, 24],
+        "initial.unevenness": [], "time.duration": 5.0, "camera.width": 32, "camera.height": 64,
+        "objects": [{"kind": "ground"}],
+    }  # fmt: skip
+    both = Scene.load("road", changes)
+    rays = both.trace([-0.2, 0.5, 2.0], paths=False)
+    assert rays.turning_height[0] > 0  # the mirage
+    assert rays.status == ("escaped",) * 3
+    lifted = np.degrees(np.arcsin(rays.end_direction[1:, 2])) - np.degrees(
+        np.hypot(rays.end[1:, 0] - both.camera.eye[0], rays.end[1:, 1] - both.camera.eye[1]) / 6_371_000.0
+    )
+    far = FarAir.of(both)
+    refraction = astronomical_refraction(
+        far.profile.index(both.air), np.radians([0.5, 2.0]), radius=6_371_000.0,
+        observer_height=both.camera.eye[2],
+    ).ravel()  # fmt: skip
+    np.testing.assert_allclose(np.array([0.5, 2.0]) - lifted, np.degrees(refraction), rtol=0.06)
+    alone = Scene.load(
+        "road", {key: part for key, part in changes.items() if key not in ("earth", "profile")}
+    )
+    straight = alone.trace([0.5, 2.0], paths=False)
+    assert np.all(np.abs(np.degrees(np.arcsin(straight.end_direction[:, 2])) - [0.5, 2.0]) < 0.01)

@@ -208,7 +208,7 @@ class Colours:
 
 
 def _filled(made: Firmament) -> Firmament:
-    """The same with the lowest rays, where some wavelengths meet the ground, as the next one that does not."""
+    """The same where the lowest rays, of which some meet the ground, are as the next one that does not."""
     parts = [made.radiance.copy(), made.transmission.copy(), made.true_elevation.copy()]
     for band, clear in enumerate(made.transmission):
         first = int(np.argmax(clear > 0))

@@ -61,7 +61,9 @@ class FarAir:
 
             measured = read_sounding(scene.profile.file)
         earth = scene.earth or Earth(flat=True)
-        return cls(scene.profile.build(earth, measured), earth, scene.air)
+        profile = scene.profile.build(earth, measured)
+        _require_reach(scene, profile)
+        return cls(profile, earth, scene.air)
 
     def alone(self) -> AirVolume:
         """Air that is all in layers."""
@@ -145,6 +147,26 @@ class FarAir:
 
     def _stretch(self, z: FloatArray) -> FloatArray:
         return self.earth.stretch(z)[:, None, None]
+
+
+def _require_reach(scene: Scene, profile: Profile) -> None:
+    """Refuse data that end below the eye or below what is looked at."""
+    places = [("camera.eye", scene.camera.eye[2])]
+    for number, entry in enumerate(scene.objects):
+        low = getattr(entry, "base", None)
+        if not isinstance(low, float) or entry.kind == "pyramid":
+            low = getattr(entry, "position", (0.0, 0.0, 0.0))[2]
+        tall = getattr(entry, "height", getattr(entry, "radius", getattr(entry, "size", (0.0, 0.0, 0.0))[2]))
+        places.append((f"objects.{number}", low + tall if entry.kind != "ground" else tall))
+    for key, height in places:
+        if height > profile.measured_top:
+            raise InputError(
+                f"the profile ends at {profile.measured_top:g} m, below what is {height:g} m high",
+                key="profile",
+                value=key,
+                expected=f"levels up to {height:g} m",
+                remedy="add a level, or lower what is looked at",
+            )
 
 
 def natural(scene: Scene, air: AirVolume) -> tuple[FloatArray, FloatArray]:
