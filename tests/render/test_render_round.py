@@ -186,3 +186,24 @@ def test_a_hot_road_under_layers_bends_near_by_and_far_away() -> None:
     )
     straight = alone.trace([0.5, 2.0], paths=False)
     assert np.all(np.abs(np.degrees(np.arcsin(straight.end_direction[:, 2])) - [0.5, 2.0]) < 0.01)
+
+
+def test_ground_truth_over_a_round_earth() -> None:
+    """Without air nothing is displaced; with it the far sea is lifted, by 1.76′ of dip for 1.92′ at 1 m."""
+    changes = {
+        **PLAIN, "camera.width": 4, "camera.height": 120, "camera.field_of_view": 4 / 120,
+        "camera.pitch": -0.82,
+        "camera.eye": [0.0, 0.0, 100.0], "camera.samples": 1,
+    }  # fmt: skip
+    seen = Scene.load("moonrise", changes)
+    picture = seen.render(truth=True)
+    assert picture.truth is not None
+    shift, distance = picture.truth.layers.displacement_y, picture.truth.layers.path_length
+    assert np.all(np.isfinite(distance))  # all of it is sea
+    # A place at distance d is lifted by k d/2R, k = 0.17 (the standard of geodesists, within a tenth).
+    pixel = np.radians(4 / 120 / 4)
+    lifted = 0.17 * distance / (2 * 6_371_000.0) / pixel
+    np.testing.assert_allclose(np.abs(shift), lifted, rtol=0.1)
+    still = seen.with_changes({"tracer.method": "straight"}).render(truth=True)
+    assert still.truth is not None
+    assert np.abs(still.truth.layers.displacement_y).max() < 0.02

@@ -167,10 +167,16 @@ class Studio:
         from nigemizu.render.truth import ground_truth
         from nigemizu.scene.truth import PictureTruth
 
-        if air is not None and not isinstance(air, AirVolume):  # otherwise it is in place still
-            self._set_air(air[len(air) // 2])
+        middle = air if air is None or isinstance(air, AirVolume) else air[len(air) // 2]
+        if middle is not air or self._colours is not None:  # otherwise it is in place still
+            self._set_air(middle)
+        vacuum, globe = None, self._integrator.globe
+        if globe is not None and self._far is not None:
+            vacuum = medium(self._scene, self._far.vacuum(), precision="double")
         # Through the middle of the aperture, where there is one.
-        layers = ground_truth(self._integrator.bending, self._built, pinhole_sensor(self._camera))
+        layers = ground_truth(
+            self._integrator.bending, self._built, pinhole_sensor(self._camera), globe=globe, vacuum=vacuum
+        )
         if self._without_air is None:
             straight = self._scene.with_changes({"tracer.method": "straight"})
             self._without_air = Studio(straight, self._variant)
@@ -189,7 +195,7 @@ class Studio:
             if given > instants:
                 break
             for band, taken in enumerate(_divided(samples[index], self._bands)):
-                self._set_air(air, band)
+                self._set_air(air, None if self._colours is None else band)
                 # Every so many points for each instant: any part of the sequence fills the aperture.
                 points = lens[index % len(lens) :: instants][:taken]
                 for sensor, count in zip(points, _divided(taken, len(points)), strict=True):
@@ -207,14 +213,15 @@ class Studio:
         """Number of wavelengths that are rendered one by one."""
         return 1 if self._colours is None else len(self._colours)
 
-    def _set_air(self, air: AirVolume | None, band: int = 0) -> None:
+    def _set_air(self, air: AirVolume | None, band: int | None = None) -> None:
+        """Put air in, for light of a band of the physical sky or of the scene's own wavelength."""
         scene = self._scene
         if air is None and scene.round and self._far is not None:
             air = self._far.vacuum()
-        elif self._colours is not None and self._far is not None and air is not None:
+        elif self._colours is not None and self._far is not None and air is not None and band is not None:
             air = self._far.at_wavelength(air, self._colours.wavelength(band))
-        if self._colours is not None:
-            self._integrator.heavens = self._colours.heavens(band, None if air is None else air)
+        if self._colours is not None and band is not None:
+            self._integrator.heavens = self._colours.heavens(band, air)
         if air is None:
             self._integrator.set_medium(None)
             return
