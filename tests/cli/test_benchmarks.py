@@ -88,6 +88,17 @@ def test_refraction_table_is_timed(
     assert all(row["seconds"] > 0 for row in measured.values())
 
 
+def test_sunset_is_timed(
+    load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sunset = load("sunset")
+    _typed(monkeypatch, "--json", "--size", "16x12", "--samples", "4", "--wavelengths", "4", "--repeat", "1")
+    sunset.main()
+    figures = json.loads(capsys.readouterr().out)
+    assert set(figures) == {"first", "sky", "picture", "together"}
+    assert all(seconds > 0 for seconds in figures.values())
+
+
 def test_work_precision_refuses_other_pictures(
     load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
