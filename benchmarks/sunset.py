@@ -2,8 +2,8 @@
 
     python benchmarks/sunset.py [--size 960x540] [--samples 64] [--wavelengths 16] [--repeat 3] [--json]
 
-The first picture compiles; it is timed apart. Sky: light scattered along bent rays, tables for one place of the
-Sun. Picture: laying the paths of every wavelength, following them, and their light.
+The first picture compiles; it is timed apart. Sky: light scattered along bent rays, tables for one place of
+the Sun. Picture: laying the paths of every wavelength, following them, and their light.
 """
 
 from __future__ import annotations

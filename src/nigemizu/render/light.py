@@ -113,7 +113,7 @@ class Light(Value):
         if self.sun_elevation < lowest or (self.sun_elevation == 0 and lowest == 0):
             raise InputError(
                 "the Sun is below the horizon" if lowest == 0 else "the Sun is so low that it is night",
-                key="sun_elevation",
+                key="light.sun_elevation",
                 value=self.sun_elevation,
                 expected=f"degrees above {lowest:g}"
                 + ("" if lowest else '; with sky = "physical", above -8'),
