@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from nigemizu.air.layers import ProfileLayer
 from nigemizu.air.standards import standard_breaks, standard_temperature
-from nigemizu.air.surface_layer import SurfaceLayer
+from nigemizu.air.surface_layer import Departure, SurfaceLayer
 
 __all__ = ["Continued", "Course", "Linear", "Near", "Smooth", "Standard", "Summed"]
 
@@ -29,6 +29,11 @@ class Course(ABC):
     @abstractmethod
     def breaks(self) -> FloatArray:
         """Heights [m] at which a derivative jumps."""
+
+    @property
+    @abstractmethod
+    def kinks(self) -> FloatArray:
+        """Those of the breaks at which the first derivative jumps."""
 
     @property
     def scales(self) -> tuple[tuple[float, float], ...]:
@@ -54,6 +59,10 @@ class Standard(Course):
     def breaks(self) -> FloatArray:
         return standard_breaks()
 
+    @property
+    def kinks(self) -> FloatArray:
+        return standard_breaks()
+
 
 @final
 class Linear(Course):
@@ -72,37 +81,39 @@ class Linear(Course):
     """
 
     def __init__(self, heights: FloatArray, values: FloatArray, rounding: float = 0.0) -> None:
-        self._corners = heights[1:-1]
-        slopes = np.diff(values) / np.diff(heights)
-        self._first = float(heights[0]), float(values[0]), float(slopes[0])
-        self._jumps = np.diff(slopes)
+        self._heights, self._values = heights, values
+        self._slopes = np.diff(values) / np.diff(heights)
         self._half = rounding / 2
 
     def value_and_slope(self, height: FloatArray) -> tuple[FloatArray, FloatArray]:
-        start, value, slope = self._first
-        values = value + slope * (height - start)
-        slopes = np.full_like(height, slope)
-        for corner, jump in zip(self._corners, self._jumps, strict=True):
-            beyond = height - corner
-            if self._half == 0:
-                values += jump * np.maximum(beyond, 0)
-                slopes += jump * (beyond >= 0)
-                continue
-            u = np.clip(beyond / self._half, -1, 1)
+        corners, jumps, half = self._heights[1:-1], np.diff(self._slopes), self._half
+        cell = np.searchsorted(corners, height, side="right")
+        slope = self._slopes[cell]
+        value = self._values[cell] + slope * (height - self._heights[cell])
+        # What rounding adds; where it is wider than the lines are long, of several corners.
+        first = np.searchsorted(corners, height - half)
+        last = np.searchsorted(corners, height + half)
+        for number in range(int(np.max(last - first, initial=0)) if half > 0 else 0):
+            corner = np.minimum(first + number, len(corners) - 1)
+            jump = np.where(first + number < last, jumps[corner], 0.0)
+            u = np.clip((height - corners[corner]) / half, -1, 1)
             ramp = (5 + u * (16 + u * (15 + u**2 * (-5 + u**2)))) / 32
-            values += jump * (self._half * ramp + np.maximum(beyond - self._half, 0))
-            slopes += jump * (8 + u * (15 + u**2 * (-10 + 3 * u**2))) / 16
-        return values, slopes
+            value = value + jump * half * (ramp - np.maximum(u, 0))
+            slope = slope + jump * ((8 + u * (15 + u**2 * (-10 + 3 * u**2))) / 16 - (cell > corner))
+        return value, slope
 
     @property
     def breaks(self) -> FloatArray:
-        if self._half == 0:
-            return self._corners
-        return np.concatenate([self._corners - self._half, self._corners + self._half])
+        corners = self._heights[1:-1]
+        return corners if self._half == 0 else np.concatenate([corners - self._half, corners + self._half])
+
+    @property
+    def kinks(self) -> FloatArray:
+        return self._heights[1:-1] if self._half == 0 else np.array([])
 
     @property
     def scales(self) -> tuple[tuple[float, float], ...]:
-        return tuple((float(corner), self._half) for corner in self._corners if self._half > 0)
+        return tuple((float(corner), self._half) for corner in self._heights[1:-1] if self._half > 0)
 
 
 @final
@@ -144,39 +155,74 @@ class Smooth(Course):
     def breaks(self) -> FloatArray:
         return self._heights
 
+    @property
+    def kinks(self) -> FloatArray:
+        return self._heights[[0, -1]]
+
 
 @final
 class Continued(Course):
     """A course up to a height, and another one above, to which it fades over a length.
 
-    Above the height h₀ it is other(h) + (one(h₀) − other(h₀)) exp(−(h − h₀)/fading); with `other` None the
-    value of h₀ stays.
+    Parameters
+    ----------
+    one : Course
+    until : float, m
+    other : Course or None
+        With None the value at `until` stays.
+    fading : float, m
+    joining : float, m
+        Over which the slope passes from that of the one to that of the other; 0 makes a kink.
+
+    Notes
+    -----
+    With x = h − until, it is other(h) + A exp(−x/fading) + B x exp(−x/joining), where A and B make value and
+    slope continuous.
     """
 
-    def __init__(self, one: Course, until: float, other: Course | None, fading: float) -> None:
-        self._one, self._until, self._other, self._fading = one, until, other, fading
+    def __init__(
+        self, one: Course, until: float, other: Course | None, fading: float, joining: float = 0.0
+    ) -> None:
+        self._one, self._until, self._other = one, until, other
+        self._fading, self._joining = fading, joining
         end = np.array([until])
-        self._end = float(one.value_and_slope(end)[0][0])
-        self._apart = 0.0 if other is None else self._end - float(other.value_and_slope(end)[0][0])
+        (value,), (slope,) = one.value_and_slope(end)
+        (there,), (rise,) = ((value,), (0.0,)) if other is None else other.value_and_slope(end)
+        self._there, self._apart = float(there), float(value - there)
+        self._bend = float(slope - rise + self._apart / fading) if joining > 0 else 0.0
 
     def value_and_slope(self, height: FloatArray) -> tuple[FloatArray, FloatArray]:
         below = height < self._until
         value, slope = self._one.value_and_slope(np.minimum(height, self._until))
-        if self._other is None:
-            return np.where(below, value, self._end), np.where(below, slope, 0.0)
-        above, rise = self._other.value_and_slope(np.maximum(height, self._until))
-        apart = self._apart * np.exp(-np.maximum(height - self._until, 0) / self._fading)
-        return np.where(below, value, above + apart), np.where(below, slope, rise - apart / self._fading)
+        above, rise = np.full_like(value, self._there), np.zeros_like(value)
+        if self._other is not None:
+            above, rise = self._other.value_and_slope(np.maximum(height, self._until))
+        x = np.maximum(height - self._until, 0)
+        apart = self._apart * np.exp(-x / self._fading)
+        above, rise = above + apart, rise - apart / self._fading
+        if self._joining > 0:
+            bend = self._bend * np.exp(-x / self._joining)
+            above, rise = above + bend * x, rise + bend * (1 - x / self._joining)
+        return np.where(below, value, above), np.where(below, slope, rise)
 
     @property
     def breaks(self) -> FloatArray:
-        lower = self._one.breaks
-        upper = np.array([]) if self._other is None else self._other.breaks
-        return np.concatenate([lower[lower < self._until], [self._until], upper[upper > self._until]])
+        return self._put_together("breaks", joins=True)
+
+    @property
+    def kinks(self) -> FloatArray:
+        return self._put_together("kinks", joins=self._joining == 0)
+
+    def _put_together(self, which: str, *, joins: bool) -> FloatArray:
+        lower = getattr(self._one, which)
+        upper = np.array([]) if self._other is None else getattr(self._other, which)
+        until = [self._until] if joins else []
+        return np.concatenate([lower[lower < self._until], until, upper[upper > self._until]])
 
     @property
     def scales(self) -> tuple[tuple[float, float], ...]:
-        return self._one.scales
+        own = ((self._until, self._joining),) if self._joining > 0 else ()
+        return (*self._one.scales, *own)
 
 
 @final
@@ -190,29 +236,30 @@ class Near(Course):
     """
 
     def __init__(self, course: Course, layer: SurfaceLayer, fading: float) -> None:
-        self._course, self._layer, self._fading = course, layer, fading
+        self._course, self._fading = course, fading
+        self._departure = Departure.of(layer)
         told = np.array([layer.air_height])
-        there = float(course.value_and_slope(told)[0][0] + layer.departure(told)[0])
+        there = float(course.value_and_slope(told)[0][0] + self._departure(told)[0][0])
         self._shift = (layer.air_temperature - there) * np.exp(layer.air_height / fading)
 
     def value_and_slope(self, height: FloatArray) -> tuple[FloatArray, FloatArray]:
         value, slope = self._course.value_and_slope(height)
         shift = self._shift * np.exp(-height / self._fading)
-        # Pieces of logarithms have no short derivative: a difference over a ten-thousandth of the height.
-        step = 1e-4 * np.maximum(height, self._layer.sublayer_top / 2)
-        up, down = self._layer.departure(height + step), self._layer.departure(np.maximum(height - step, 0.0))
-        rise = (up - down) / (height + step - np.maximum(height - step, 0.0))
-        return value + shift + self._layer.departure(height), slope - shift / self._fading + rise
+        departure, rise = self._departure(height)
+        return value + shift + departure, slope - shift / self._fading + rise
 
     @property
     def breaks(self) -> FloatArray:
-        own = [self._layer.sublayer_top, self._layer.blending_height or np.inf]
-        return np.unique(np.concatenate([self._course.breaks, own]))
+        return np.unique(np.concatenate([self._course.breaks, self._departure.breaks]))
+
+    @property
+    def kinks(self) -> FloatArray:
+        return self._course.kinks
 
     @property
     def scales(self) -> tuple[tuple[float, float], ...]:
-        steps = self._layer.sublayer_top * 2.0 ** np.arange(0, 16)
-        return (*self._course.scales, *((float(step), float(step) / 6) for step in steps))
+        steps = self._departure.breaks[0] * 8.0 ** np.arange(0, 5)
+        return (*self._course.scales, *((float(step), float(step) / 3) for step in steps))
 
 
 @final
@@ -232,6 +279,10 @@ class Summed(Course):
     @property
     def breaks(self) -> FloatArray:
         return self._course.breaks
+
+    @property
+    def kinks(self) -> FloatArray:
+        return self._course.kinks
 
     @property
     def scales(self) -> tuple[tuple[float, float], ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, TypeAlias, final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,11 +22,15 @@ FloatArray: TypeAlias = NDArray[np.float64]
 Gravity: TypeAlias = Callable[[FloatArray], FloatArray]
 
 _GAUSS: Final = tuple(np.polynomial.legendre.leggauss(4))
-_BELOW: Final = 1e-7  # m below a break, where its lower side is looked at
+_BELOW: Final = 1e-6  # of a layer's width, below its upper break, where its own side is looked at
 _STEPS: Final = (1e-2, 10.0, 1e-6)  # K, Pa and 1: over which the law of refraction is differentiated
 _ROUNDS: Final = 14  # of halving nodes
-_MOST_NODES: Final = 8000
-_KINK: Final = 0.02  # m, from a break to the next nodes
+_MOST_NODES: Final = 50_000
+_EVEN, _MOIST = 250.0, 20_000.0  # m: so close are nodes up to where vapour counts
+_KINK: Final = 0.02  # m, from a jump of the gradient to the next nodes
+_CLOSEST: Final = (2.5e-5, 4e-7)  # m, and of the height: nodes that single precision tells apart
+_RELATIVE: Final = 1e-6  # of dn/dh, that is as good as exact: temperatures are not known to a millionth
+_HOTTEST: Final = 3000.0  # K
 
 
 @final
@@ -60,9 +64,9 @@ class Profile:
 
     Notes
     -----
-    d ln p/dh = −g/(R_d T_v), integrated by Gauss's rule with four points in every layer and from the layer's
-    base to any height within, so that p and n are as smooth as the temperature: between breaks all
-    derivatives are continuous to round-off. T_v is the virtual temperature.
+    d ln p/dh = −g/(R_d T_v), T_v the virtual temperature, integrated by Gauss's rule with four points in each
+    layer, and from a layer's base to any height within (3e-8 of the pressure where temperatures are smooth):
+    p and n are as smooth as the temperature, all derivatives continuous between breaks.
 
     Limits: hydrostatic, ideal gas in the weight of the air (3e-4 of the pressure drop); layers are level.
     """
@@ -85,8 +89,13 @@ class Profile:
         height = self._first_nodes()
         object.__setattr__(self, "height", height)
         object.__setattr__(self, "temperature", self.course.value_and_slope(height)[0])
-        if np.any(self.temperature <= 0):
-            raise InputError("air of 0 K or less", key="profile", value=float(self.temperature.min()))
+        for wrong, words in (
+            (self.temperature <= 0, "0 K or less"),
+            (self.temperature > _HOTTEST, "a flame"),
+        ):
+            if np.any(wrong):
+                place, value = float(height[wrong][0]), float(self.temperature[wrong][0])
+                raise InputError(f"air of {words} at {place:g} m", key="profile", value=value)
         # Of dry air first; the vapour's fraction depends on the pressure only slightly.
         pressure = self._integrated(None)
         for _ in range(3 if self._moist else 0):
@@ -143,33 +152,42 @@ class Profile:
         Parameters
         ----------
         tolerance : float, 1/m
-            By how much, in between, the derivative of Hermite's cubics through n may be wrong. At 1e-12 a ray
-            errs by less than 1e-7 rad over 100 km, even if all errors have one sign.
+            By how much, in between, the derivative of Hermite's cubics through n may be wrong, apart from a
+            millionth of itself, and from layers that are thinner than 0.1 mm or 2e-6 of their height. At
+            1e-12 a ray errs by less than 1e-7 rad over 100 km, even if all errors have one sign.
+
+        Raises
+        ------
+        InputError
+            If that takes more than 50 000 nodes.
 
         Notes
         -----
-        Layers are halved until that is so. Breaks are closely surrounded, so that a spline that does not know
-        them rounds them over some centimetres only.
+        Layers are halved until that is so. Heights at which the gradient jumps are closely surrounded, so
+        that a spline that does not know them rounds them over some centimetres only. n′ = n e^(z/R) over
+        conformal heights (`nigemizu.air.Earth`) is as smooth as n over heights.
         """
         from nigemizu.air.atmosphere import Atmosphere
 
         index = LayeredIndex(self, Atmosphere(), None)
-        nodes = self.height
+        low, high = self.height[:-1], self.height[1:]
+        nodes = [self.height]
         for _ in range(_ROUNDS):
-            width = np.diff(nodes)
-            begin, end = index(nodes), index(nodes[1:] - _BELOW)
-            rise = np.diff(begin[0])
-            first, last = begin[1][:-1] * width, end[1] * width
-            c2, c3 = 3 * rise - 2 * first - last, first + last - 2 * rise
-            wrong = np.zeros_like(width)
-            for w in (0.2, 0.5, 0.8):
-                slope = (first + w * (2 * c2 + w * 3 * c3)) / width
-                wrong = np.maximum(wrong, np.abs(slope - index(nodes[:-1] + w * width)[1]))
-            coarse = (wrong > tolerance) & (width > 2 * _KINK)
-            if not np.any(coarse) or len(nodes) > _MOST_NODES:
+            closest = 4 * np.maximum(_CLOSEST[0], _CLOSEST[1] * high)
+            coarse = (_wrong(index, low, high, tolerance) > 1) & (high - low > closest)
+            if not np.any(coarse):
                 break
-            nodes = np.sort(np.concatenate([nodes, nodes[:-1][coarse] + width[coarse] / 2]))
-        return nodes
+            low, high = low[coarse], high[coarse]
+            nodes.append((low + high) / 2)
+            low, high = np.concatenate([low, nodes[-1]]), np.concatenate([nodes[-1], high])
+            if sum(map(len, nodes)) > _MOST_NODES:
+                raise InputError(
+                    f"takes more than {_MOST_NODES} nodes",
+                    key="tolerance",
+                    value=tolerance,
+                    remedy="allow a larger one, or smooth the profile (profile.smoothing)",
+                )
+        return np.sort(np.concatenate(nodes))
 
     @property
     def _moist(self) -> bool:
@@ -179,20 +197,22 @@ class Profile:
         """Heights that see every break and every layer, coarse elsewhere."""
         far = np.concatenate([[0.0], np.geomspace(0.05, 1.0, 40)]) * (self.top - self.base)
         near = np.concatenate([[0.0], np.geomspace(0.02, 1000.0, 60)])
-        places = [self.base + far, self.base + near, self.breaks]
-        around = _KINK * 2.0 ** np.arange(12)
-        places += [value + sign * around for value in self.breaks for sign in (-1, 1)]
+        # Between these the pressure's logarithm is nearly straight, as the vapour in `_drop` takes it.
+        even = np.arange(0.0, _MOIST, _EVEN)
+        places = [self.base + far, self.base + near, self.base + even]
+        around = np.concatenate([sign * _KINK * 2.0 ** np.arange(12) for sign in (-1, 1)])
+        kinks = np.concatenate([self.course.kinks, self.vapour.kinks])
+        places.append((kinks[:, None] + around).ravel())
         for middle, extent in self.course.scales:
             places.append(middle + extent * np.linspace(-3, 3, 61))
             places.append(middle + extent * np.linspace(3, 12, 30))
         heights = np.unique(np.concatenate(places))
-        heights = heights[(heights > self.base) & (heights < self.top)]
-        # Breaks stay; what lies within a centimetre of its neighbour is left out.
+        # Breaks stay; what is too close to them, or to its neighbour, is left out.
         ends = np.concatenate([[self.base], self.breaks, [self.top]])
-        heights = heights[_nearest(heights, ends) > _KINK / 2]
-        kept = np.unique(np.concatenate([heights, ends]))
-        thin = np.concatenate([[True], np.diff(kept) > _KINK / 4])
-        return kept[thin | np.isin(kept, ends)]
+        heights = heights[(heights > self.base) & (heights < self.top)]
+        closest = np.maximum(_CLOSEST[0], _CLOSEST[1] * np.abs(heights))
+        heights = heights[(_nearest(heights, ends) > closest) & (np.diff(heights, prepend=-np.inf) > closest)]
+        return np.unique(np.concatenate([heights, ends]))
 
     def _integrated(self, pressure: FloatArray | None) -> FloatArray:
         """Pressure [Pa] at the nodes, with vapour as at `pressure`."""
@@ -266,12 +286,20 @@ class LayeredIndex:
         if np.any(fraction > 0):
             if profile.vapour_is != "fraction":
                 # x_w = h f(T, p) e_s(T)/p, by all three
-                up = profile._fraction(h, temperature + _STEPS[0], pressure)
-                down = profile._fraction(h, temperature - _STEPS[0], pressure)
+                warmer, denser = _STEPS[0], 1e-3 * pressure
+                by_warmth = self._change(h, temperature, pressure, warmer, 0.0) / (2 * warmer)
+                by_pressure = self._change(h, temperature, pressure, 0.0, denser) / (2 * denser)
                 rise = np.divide(fraction * rise, given, out=np.zeros_like(fraction), where=given > 0)
-                rise = rise + (up - down) / (2 * _STEPS[0]) * warmth - fraction * fall / pressure
+                rise = rise + by_warmth * warmth + by_pressure * fall
             slope = slope + rise * self._partial(state, 2)
         return self._law(*state), slope
+
+    def _change(
+        self, h: FloatArray, temperature: FloatArray, pressure: FloatArray, warmer: float, denser: Any
+    ) -> FloatArray:
+        """Of the vapour's mole fraction, from so much below to so much above."""
+        up = self._profile._fraction(h, temperature + warmer, pressure + denser)
+        return up - self._profile._fraction(h, temperature - warmer, pressure - denser)
 
     def _law(self, temperature: FloatArray, pressure: FloatArray, fraction: FloatArray) -> FloatArray:
         return _law(self._atmosphere, self._wavelength, temperature, pressure, fraction)
@@ -315,6 +343,19 @@ def _law(
         model=atmosphere.model,
         gladstone_dale_constant=atmosphere.gladstone_dale_constant,
     )
+
+
+def _wrong(index: LayeredIndex, low: FloatArray, high: FloatArray, tolerance: float) -> FloatArray:
+    """Largest error of the derivative of Hermite's cubics in layers, in units of what is allowed."""
+    width = (high - low) * (1 - _BELOW)
+    (begin, first), (end, last) = index(low), index(low + width)
+    rise, first, last = end - begin, first * width, last * width
+    worst = np.zeros_like(width)
+    for w in (0.2, 0.5, 0.8):
+        cubic = (first + w * (2 * (3 * rise - 2 * first - last) + w * 3 * (first + last - 2 * rise))) / width
+        slope = index(low + w * width)[1]
+        worst = np.maximum(worst, np.abs(cubic - slope) / (tolerance + _RELATIVE * np.abs(slope)))
+    return worst
 
 
 def _nearest(heights: FloatArray, ends: FloatArray) -> FloatArray:

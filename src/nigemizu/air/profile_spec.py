@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Protocol, Self, TypeAlias, final
 
@@ -13,7 +14,8 @@ from nigemizu.air.courses import Continued, Course, Linear, Near, Smooth, Standa
 from nigemizu.air.earth import Earth
 from nigemizu.air.layers import Layer
 from nigemizu.air.profile import Profile
-from nigemizu.air.standards import STANDARD_TOP, standard_gravity
+from nigemizu.air.rows import COLDEST, HOTTEST, Rows, refuse_other_pressures
+from nigemizu.air.standards import STANDARD_TOP, standard_atmosphere, standard_gravity
 from nigemizu.air.surface_layer import SurfaceLayer
 from nigemizu.errors import InputError
 from nigemizu.values import Value
@@ -25,11 +27,9 @@ FloatArray: TypeAlias = NDArray[np.float64]
 _HUMID: Final = 12_000.0  # m, over which a standard's relative humidity falls to 0
 _FADING: Final = 3_000.0  # m, over which what continues a table forgets it
 _DRYING: Final = 2_000.0  # m, over which the vapour above a table falls to 1/e
+_JOINING: Final = 200.0  # m, at most, over which the gradient above a table forgets that of its last rows
 _BLENDING: Final = 50.0  # m, above which a surface layer fades
-_PRESSURE: Final = 101_325.0
-_COLD, _HOT = 120.0, 400.0  # K: beyond these a temperature is in another unit
 _THIN: Final = 2_000.0  # Pa at the ground: less is in hPa
-_LEAST: Final = 2  # levels
 
 Numbers = tuple[float, ...]
 
@@ -59,15 +59,17 @@ class ProfileSpec(Value):
     surface_temperature : float, K, optional
         Of a standard atmosphere at height 0: the difference to 288.15 K fades linearly to the tropopause.
     surface_pressure : float, Pa, optional
-        At the lowest height; 101 325 unless given here or by the data.
+        At the lowest height; unless given here or by the data, that of the standard atmosphere there.
     relative_humidity : float, 1
         Of a standard atmosphere at height 0; falls linearly to 0 at 12 km.
     heights : list of float, m
         Of a table, increasing.
     temperatures : list of float, K
         At them.
+    pressures : list of float, Pa, optional
+        At them. The first one counts; the others must be within 5 % of what the weight of the air makes them.
     relative_humidities : list of float, 1
-        At them, linear between and fading above; dry if left out.
+        At them, in between as the temperatures, fading over 2 km above; dry if left out.
     file : path, optional
         A sounding (University of Wyoming, IGRA), a column of a model (netCDF) or a table (CSV, TOML).
     smoothing : float, m, optional
@@ -76,12 +78,14 @@ class ProfileSpec(Value):
         without extremes of their own.
     beyond : {"standard", "isothermal"}
         Above a table: the standard atmosphere, to which the last temperature fades over 3 km; or as warm as
-        the last point.
+        the last point. The gradient passes from the one to the other over the last interval, 200 m at most,
+        or over `smoothing`.
     layers : list of layers
-        Added on top: ``inversion``, ``exponential``, ``gaussian``.
+        Added on top: ``inversion``, ``exponential``, ``gaussian``. Their heights count from height 0.
     surface_layer : SurfaceLayer, optional
         Air that the ground warms or cools while the wind mixes it; its `blending_height` is 50 m where it is
         not given. The profile is shifted, by a difference that fades over 3 km, to meet its air temperature.
+        Its ground is at height 0; down to there the lowest row of a table holds.
     top : float, m
         Where the air ends; 86 km for the standard of 1976, 80 km for ISA.
 
@@ -93,7 +97,7 @@ class ProfileSpec(Value):
     """
 
     kind: Literal["us1976", "isa", "table", "file"] = "us1976"
-    surface_temperature: Annotated[float, Field(ge=_COLD, le=_HOT)] | None = Field(
+    surface_temperature: Annotated[float, Field(ge=COLDEST, le=HOTTEST)] | None = Field(
         None, json_schema_extra={"unit": "K"}
     )
     surface_pressure: Annotated[float, Field(ge=_THIN, le=1e6)] | None = Field(
@@ -102,6 +106,7 @@ class ProfileSpec(Value):
     relative_humidity: Annotated[float, Field(ge=0, le=1, json_schema_extra={"unit": "1"})] = 0.0
     heights: Annotated[Numbers, Field(json_schema_extra={"unit": "m"})] = ()
     temperatures: Annotated[Numbers, Field(json_schema_extra={"unit": "K"})] = ()
+    pressures: Annotated[Numbers, Field(json_schema_extra={"unit": "Pa"})] = ()
     relative_humidities: Annotated[Numbers, Field(json_schema_extra={"unit": "1"})] = ()
     file: Path | None = None
     smoothing: Annotated[float, Field(ge=0)] | None = Field(None, json_schema_extra={"unit": "m"})
@@ -112,9 +117,8 @@ class ProfileSpec(Value):
 
     @model_validator(mode="after")
     def _is_one_profile(self) -> Self:
-        table = {"heights": self.heights, "temperatures": self.temperatures}
-        for name, numbers in (*table.items(), ("relative_humidities", self.relative_humidities)):
-            if numbers and self.kind != "table":
+        for name in ("heights", "temperatures", "pressures", "relative_humidities"):
+            if getattr(self, name) and self.kind != "table":
                 raise InputError("goes with a table only", key=name, remedy='set kind = "table"')
         if (self.file is not None) != (self.kind == "file"):
             raise InputError(
@@ -123,52 +127,31 @@ class ProfileSpec(Value):
                 remedy="name the sounding" if self.kind == "file" else 'set kind = "file"',
             )
         if self.kind == "table":
-            self._check_table()
-        elif self.kind == "file" and self.surface_temperature is not None:
-            raise InputError("belongs to a standard atmosphere", key="surface_temperature")
+            self._rows().refuse()
+        self._refuse_unused()
         return self
 
-    def _check_table(self) -> None:
-        if len(self.heights) < _LEAST:
-            raise InputError("a table needs two rows at least", key="heights", value=list(self.heights))
-        for name in ("temperatures", "relative_humidities"):
-            numbers = getattr(self, name)
-            if len(numbers) != len(self.heights) and (numbers or name == "temperatures"):
-                raise InputError(
-                    f"{len(numbers)} rows beside {len(self.heights)} heights",
-                    key=name,
-                    expected="one for each height",
-                )
-        for row, (below, above) in enumerate(zip(self.heights[:-1], self.heights[1:], strict=True), start=2):
-            if above <= below:
-                raise InputError(
-                    f"row {row} does not lie above row {row - 1}",
-                    key="heights",
-                    value=above,
-                    expected=f"metres above {below:g}",
-                )
-        for row, temperature in enumerate(self.temperatures, start=1):
-            if not _COLD < temperature < _HOT:
-                others = [value for value in self.temperatures if _COLD < value < _HOT]
-                mixed = "; the other rows are kelvins" if others else ""
-                raise InputError(
-                    f"row {row} is no temperature of air in K{mixed}",
-                    key="temperatures",
-                    value=temperature,
-                    expected=f"kelvins from {_COLD:g} to {_HOT:g}",
-                    remedy=f"is it {temperature:g} °C? that is {temperature + 273.15:g} K"
-                    if abs(temperature) < 70
-                    else None,
-                )
-        for row, humidity in enumerate(self.relative_humidities, start=1):
-            if not 0 <= humidity <= 1:
-                raise InputError(
-                    f"row {row} is no relative humidity",
-                    key="relative_humidities",
-                    value=humidity,
-                    expected="from 0 to 1",
-                    remedy=f"if it is in per cent, write {humidity / 100:g}" if 1 < humidity <= 100 else None,
-                )
+    def _refuse_unused(self) -> None:
+        """What would be given in vain."""
+        standard = self.kind in ("us1976", "isa")
+        unused = {
+            "surface_temperature": not standard and self.surface_temperature is not None,
+            "relative_humidity": not standard and self.relative_humidity > 0,
+            "smoothing": standard and self.smoothing is not None,
+            "beyond": standard and self.beyond != "standard",
+        }
+        for key, given in unused.items():
+            if given:
+                owner = "tables and soundings" if standard else "a standard atmosphere"
+                remedy = None
+                if key == "relative_humidity" and self.kind == "table":
+                    remedy = "give relative_humidities, one for each height"
+                raise InputError(f"belongs to {owner}", key=key, value=getattr(self, key), remedy=remedy)
+        if self.pressures and self.surface_pressure is not None:
+            raise InputError("is given by the first of the pressures", key="surface_pressure")
+
+    def _rows(self) -> Rows:
+        return Rows(self.heights, self.temperatures, self.pressures, self.relative_humidities)
 
     def build(self, earth: Earth, measured: MeasuredAir | None = None) -> Profile:
         """The profile over an Earth.
@@ -191,59 +174,89 @@ class ProfileSpec(Value):
             humidity = Continued(
                 Linear(np.array([0.0, _HUMID]), np.array([self.relative_humidity, 0.0])), _HUMID, None, 1.0
             )
-            return self._profile(
-                Standard(offset), humidity, "relative humidity", gravity=standard_gravity, top=top
+            pressure = (
+                float(standard_atmosphere(0.0)[1]) if self.surface_pressure is None else self.surface_pressure
             )
-        if self.kind == "table":
-            heights, temperatures = np.array(self.heights), np.array(self.temperatures)
-            given = self.relative_humidities or (0.0,) * len(heights)
-            vapour, vapour_is, pressure = np.array(given), "relative humidity", _PRESSURE
-        else:
-            if measured is None:
-                raise InputError("has not been read", key="profile.file", value=str(self.file))
-            heights, temperatures = measured.height, measured.temperature
-            vapour, vapour_is, pressure = measured.vapour_fraction, "fraction", float(measured.pressure[0])
-        last = float(heights[-1])
+            rest: dict[str, Any] = {"base": 0.0, "top": top, "surface_pressure": pressure}
+            course = self._with_layers(Standard(offset))
+            return Profile(course, humidity, "relative humidity", gravity=standard_gravity, **rest)
+        if self.kind == "file" and measured is None:
+            raise InputError("has not been read", key="profile.file", value=str(self.file))
+        return self._of_data(earth, top, measured)
+
+    def _of_data(self, earth: Earth, top: float, measured: MeasuredAir | None) -> Profile:
+        """The profile through a table, or what was measured, and on up to the top."""
+        rows, vapour_is = self._rows(), "relative humidity"
+        if measured is not None:
+            parts = (measured.height, measured.temperature, measured.pressure, measured.vapour_fraction)
+            names = ("height", "temperature", "pressure", "vapour_fraction")
+            rows, vapour_is = Rows(*parts, names, None if self.file is None else str(self.file)), "fraction"
+            rows.refuse()
+        heights, temperatures, pressures, vapours = (np.array(part, dtype=np.float64) for part in rows[:4])
+        vapours = vapours if len(vapours) else np.zeros_like(heights)
+        first, last = float(heights[0]), float(heights[-1])
         if last >= top:
             raise InputError("the data reach above the top of the air", key="profile.top", value=top)
+        at_first = self.surface_pressure or float([*pressures, *standard_atmosphere(heights[:1])[1]][0])
+        levels = self._down_to_ground(heights)
+        if len(levels) > len(heights):
+            temperatures, vapours = (np.concatenate([part[:1], part]) for part in (temperatures, vapours))
+        course, humid = self._courses(levels, temperatures, vapours, top)
+        rest: dict[str, Any] = {"gravity": earth.gravity, "base": float(levels[0]), "top": top}
+        rest |= {
+            "measured_top": last,
+            "notes": (f"above {last:g} m the {self.beyond} continuation, not data",),
+        }
+        profile = Profile(course, humid, vapour_is, surface_pressure=at_first, **rest)
+        if len(levels) > len(heights):
+            at_ground = at_first**2 / float(profile.at(first)[1])
+            profile = Profile(course, humid, vapour_is, surface_pressure=at_ground, **rest)
+        if self.pressures:
+            off = refuse_other_pressures(pressures, profile.at(heights)[1])
+            note = f"pressures given differ by up to {off:.2%} from those of air at rest, which count"
+            return replace(profile, notes=(*profile.notes, note))
+        return profile
+
+    def _courses(
+        self, heights: FloatArray, temperatures: FloatArray, vapours: FloatArray, top: float
+    ) -> tuple[Course, Course]:
+        """Temperature, and vapour, through the rows and above them."""
+        last = float(heights[-1])
         other = Standard() if self.beyond == "standard" else None
-        course: Course = Continued(self._through(heights, temperatures), last, other, _FADING)
-        dry = Linear(np.array([0.0, top]), np.zeros(2))
-        humid = Continued(Linear(heights, vapour), last, dry, _DRYING) if np.any(vapour > 0) else dry
-        note = f"above {last:g} m the {self.beyond} continuation, not data"
-        return self._profile(
-            course,
-            humid,
-            vapour_is,
-            gravity=earth.gravity,
-            top=top,
-            base=float(heights[0]),
-            pressure=pressure,
-            measured_top=last,
-            notes=(note,),
+        joining = (
+            min(float(heights[-1] - heights[-2]), _JOINING) if self.smoothing is None else self.smoothing
         )
+        course: Course = Continued(self._through(heights, temperatures), last, other, _FADING, joining)
+        dry = Linear(np.array([0.0, top]), np.zeros(2))
+        moist = np.any(vapours > 0)
+        humid = Continued(self._through(heights, vapours), last, dry, _DRYING) if moist else dry
+        return self._with_layers(course), humid
 
     def _through(self, heights: FloatArray, values: FloatArray) -> Course:
-        if self.smoothing is None and len(heights) > _LEAST:
+        if self.smoothing is None and len(heights) > 2:
             return Smooth(heights, values)
         return Linear(heights, values, self.smoothing or 0.0)
 
-    def _profile(
-        self,
-        course: Course,
-        vapour: Course,
-        vapour_is: str,
-        *,
-        base: float = 0.0,
-        pressure: float = _PRESSURE,
-        **rest: Any,
-    ) -> Profile:
+    def _down_to_ground(self, heights: FloatArray) -> FloatArray:
+        """The heights of the rows, and height 0 below them for a surface layer."""
+        if self.surface_layer is None or heights[0] == 0:
+            return heights
+        blending = self.surface_layer.blending_height or _BLENDING
+        if not 0 < heights[0] <= blending:
+            raise InputError(
+                "stands on the ground, at height 0, which the data do not reach"
+                if heights[0] > 0
+                else "stands on the ground, at height 0, and the data begin below it",
+                key="profile.surface_layer",
+                value=float(heights[0]),
+                expected=f"a first row between 0 and {blending:g} m",
+            )
+        return np.concatenate([[0.0], heights])
+
+    def _with_layers(self, course: Course) -> Course:
         if self.surface_layer is not None:
             layer = self.surface_layer
             if layer.blending_height is None:
                 layer = layer.model_copy(update={"blending_height": _BLENDING})
             course = Near(course, layer, _FADING)
-        if self.layers:
-            course = Summed(course, self.layers)
-        at_base = pressure if self.surface_pressure is None else self.surface_pressure
-        return Profile(course, vapour, vapour_is, base=base, surface_pressure=at_base, **rest)
+        return Summed(course, self.layers) if self.layers else course

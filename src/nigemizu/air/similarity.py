@@ -231,8 +231,10 @@ def _psi_stable(zeta: FloatArray) -> FloatArray:
     return np.asarray(-STABLE * (np.clip(zeta, 0.0, 1.0) + np.log(np.maximum(zeta, 1.0))))
 
 
-def phi_heat(zeta: float) -> float:
-    return 1.0 / math.sqrt(1.0 - UNSTABLE * zeta) if zeta < 0.0 else 1.0 + STABLE * min(zeta, 1.0)
+def phi_heat(zeta: ArrayLike) -> FloatArray:
+    ratio = np.asarray(zeta, dtype=np.float64)
+    unstable = 1.0 / np.sqrt(1.0 - UNSTABLE * np.minimum(ratio, 0.0))
+    return np.where(ratio < 0.0, unstable, 1.0 + STABLE * np.clip(ratio, 0.0, 1.0))
 
 
 def heat_capacity(pressure: float, temperature: float) -> float:

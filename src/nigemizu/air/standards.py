@@ -57,8 +57,7 @@ def standard_temperature(height: ArrayLike) -> tuple[FloatArray, FloatArray]:
     [288.15, 216.65]
     """
     h = _check.checked(height, "height", "metres from -5000 to 86000", low=-5000.0, high=86_000.0)
-    geopotential = _EARTH * h / (_EARTH + h)
-    layer = np.clip(np.searchsorted(_BASES, geopotential, side="right") - 1, 0, None)
+    geopotential, layer = _layer(h)
     temperature = _WARMTH[layer] + _LAPSES[layer] * (geopotential - _BASES[layer])
     return temperature, _LAPSES[layer] * (_EARTH / (_EARTH + h)) ** 2
 
@@ -115,11 +114,15 @@ def standard_atmosphere(
     bases = [_PRESSURE]
     for base, above, lapse, warmth in zip(_BASES[:-1], _BASES[1:], _LAPSES[:-1], _WARMTH[:-1], strict=True):
         bases.append(bases[-1] * float(_fall(above - base, lapse, warmth)))
-    geopotential = _EARTH * h / (_EARTH + h)
-    layer = np.clip(np.searchsorted(_BASES, geopotential, side="right") - 1, 0, None)
+    geopotential, layer = _layer(h)
     climb = geopotential - _BASES[layer]
     pressure = np.asarray(bases)[layer] * _fall(climb, _LAPSES[layer], _WARMTH[layer])
     return temperature, pressure, pressure / (_GAS * temperature)
+
+
+def _layer(height: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Geopotential heights [m], and the layers that hold them; a break belongs to the layer above it."""
+    return _EARTH * height / (_EARTH + height), np.searchsorted(standard_breaks(), height, side="right")
 
 
 def _fall(climb: FloatArray, lapse: FloatArray, warmth: FloatArray) -> FloatArray:

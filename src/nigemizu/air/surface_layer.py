@@ -153,15 +153,40 @@ class SurfaceLayer(Value):
         InputError
             If a height is below 0 or not finite, or if there is no `blending_height`.
         """
-        z = _check.checked(height, "height", "metres from 0 up", low=0.0)
-        profile = _profile(self)
+        return Departure.of(self)(height)[0]
+
+
+@final
+class Departure(NamedTuple):
+    """What a layer departs from the well-mixed air above it, solved once for many heights."""
+
+    profile: _Profile
+
+    @classmethod
+    def of(cls, layer: SurfaceLayer) -> Self:
+        """That of a layer with a blending height, or an `InputError`."""
+        profile = _profile(layer)
         if profile.blending is None:
             raise InputError(
                 "a layer that never fades departs from nothing",
                 key="blending_height",
                 remedy="give a blending_height, such as 50 m",
             )
-        return profile.potential(z) - profile.mixed
+        return cls(profile)
+
+    def __call__(self, height: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Potential temperature [K] less that of the mixed air, and its derivative [K/m]."""
+        z = _check.checked(height, "height", "metres from 0 up", low=0.0)
+        return self.profile.potential(z) - self.profile.mixed, self.profile.slope(z)
+
+    @property
+    def breaks(self) -> FloatArray:
+        """Heights [m] at which a higher derivative jumps, the top of the sublayer first."""
+        profile = self.profile
+        top = math.inf if profile.blending is None else profile.blending
+        corner = profile.fluxes.obukhov_length  # φ has one at z = L in stable air
+        inner = [corner] if profile.line_top < corner < top else []
+        return np.array([profile.line_top, *inner, top])
 
 
 class _Profile(NamedTuple):
@@ -188,18 +213,21 @@ class _Profile(NamedTuple):
     def mixed(self) -> float:
         """Potential temperature [K] of the well-mixed air above."""
         top = self.blending or math.inf
-        return float(self.potential(np.asarray(top))) + self._slope(top) * top
+        return float(self.potential(np.asarray(top)) + self._slope(top) * top)
 
     @property
     def _inverse(self) -> float:
         return 1.0 / self.fluxes.obukhov_length
 
-    def _slope(self, z: float) -> float:
-        return (
-            self.fluxes.temperature_scale
-            / (similarity.VON_KARMAN * z)
-            * similarity.phi_heat(z * self._inverse)
-        )
+    def slope(self, z: FloatArray) -> FloatArray:
+        """dθ/dz [K/m]."""
+        top = np.inf if self.blending is None else self.blending
+        curve = self._slope(np.clip(z, self.line_top, top))
+        return curve if self.blending is None else curve * np.exp(-np.maximum(z - top, 0.0) / top)
+
+    def _slope(self, z: FloatArray | float) -> FloatArray:
+        gradient = self.fluxes.temperature_scale / (similarity.VON_KARMAN * z)
+        return np.asarray(gradient * similarity.phi_heat(z * self._inverse))
 
 
 def _profile(layer: SurfaceLayer) -> _Profile:
@@ -271,7 +299,7 @@ def _line_top(rough: float, inverse: float) -> float:
 
     def above(log: float) -> float:
         z = rough * math.exp(log)
-        return similarity.rise(psi_heat, rough, z, inverse) - similarity.phi_heat(z * inverse)
+        return similarity.rise(psi_heat, rough, z, inverse) - float(similarity.phi_heat(z * inverse))
 
     # H is at least ln(z/zh), and φh at most 1 + β, in stable air; in unstable air they meet below e zh.
     return rough * math.exp(similarity.root(above, 0.0, 1.0 + similarity.STABLE))
