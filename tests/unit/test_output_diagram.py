@@ -106,6 +106,48 @@ def test_parts_may_be_left_out(tmp_path):
     assert "height above the ground (m)" in words
 
 
+def over_a_round_sea(dip, radius=6371e3, eye=10.0):
+    """A straight ray: z = eye - dip x + x²/2R, which turns up over the sea without any air."""
+    x = np.linspace(0.0, 34e3, 1201)
+    z = eye - dip * x + x**2 / (2.0 * radius)
+    return DiagramRay(x, z, "escaped")
+
+
+def test_over_the_sea_of_a_round_earth(tmp_path):
+    """Nothing hot turns these rays, and 34 km are not written in metres."""
+    # sqrt(2·10 m / 6371 km) = 1.772 mrad is the dip of the horizon: these pass above it.
+    rays = [over_a_round_sea(dip) for dip in (0.0005, 0.001, 0.00177)]
+    assert {one.kind() for one in rays} == {"turned"}
+    line = (rays[-1].x[600:], rays[-1].z[600:])
+    words = texts(ray_diagram(tmp_path / "a.svg", rays=rays, profile=PROFILE, vanishing=line, surface="sea"))
+    for expected in (
+        "distance (km)",
+        "height above the sea (m)",
+        "lowest over the sea, then up again",
+        "the sea is seen",
+        "no sea is seen",
+        "vanishing line: below it nothing is seen",
+    ):
+        assert expected in words
+    assert not [word for word in words if "hot air" in word or "ground" in word]
+    ticks = [float(word) for word in words if re.fullmatch(r"\d+", word) and float(word) <= 40]
+    assert {0, 10, 20, 30} <= set(ticks)
+
+
+def test_a_point_of_a_vanishing_line_and_parts_of_a_ship_are_not_all_named(tmp_path):
+    rays = [over_a_round_sea(0.001)]
+    sides = np.array([29990.0, 30010.0, 30010.0, 29990.0])
+    parts = [
+        Outline(name, sides + shift, np.array([low, low, high, high]))
+        for name, low, high, shift in (("hull", 0, 8, 0), ("mast", 8, 20, 2), ("buoy", 0, 3, -9e3))
+    ]
+    line = (np.array([29900.0, 30000.0]), np.array([0.0, 0.1]))
+    path = tmp_path / "a.svg"
+    words = texts(ray_diagram(path, rays=rays, objects=parts, vanishing=line, surface="sea"))
+    assert {word for word in words if word.startswith("object ")} == {"object mast", "object buoy"}
+    assert not [word for word in words if word.startswith("vanishing")]
+
+
 def test_colours_reach_the_picture(tmp_path):
     path = ray_diagram(tmp_path / "rays.png", rays=BUNDLE, profile=PROFILE, top=5.0)
     with Image.open(path) as image:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,21 +23,34 @@ if TYPE_CHECKING:
 __all__ = ["ray_diagram"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
+Surface: TypeAlias = Literal["ground", "sea"]
 
 _COLOURS: Final = {"turned": "#c8442b", "direct": "#2a6f97", "sky": "#8fb3c9", "lost": "#b0b0b0"}
 _NAMES: Final = {
-    "turned": "turned back up by the hot air",
-    "direct": "to the ground or an object",
-    "sky": "to the sky",
-    "lost": "out of steps",
+    "ground": {
+        "turned": "turned back up by the hot air",
+        "direct": "to the ground or an object",
+        "sky": "to the sky",
+        "lost": "out of steps",
+    },
+    # Heights above a round sea: it falls away under each ray, and a straight one comes up again, too.
+    "sea": {
+        "turned": "lowest over the sea, then up again",
+        "direct": "to the sea or an object",
+        "sky": "to the sky",
+        "lost": "out of steps",
+    },
 }
 _INK: Final = "#22303a"
-_GROUND: Final = "#d9c7a3"
+_GROUND: Final = {"ground": "#d9c7a3", "sea": "#a9c3cf"}
 _OBJECT: Final = "#b08d57"
 _POINTS: Final = 600  # per ray; more cannot be seen
 
 _STRIP: Final = 0.065  # depth of the ground that is drawn, in heights of the figure
 _LETTER: Final = 0.0085  # width of a letter there, in widths of the figure
+_WORTH_A_NAME: Final = 0.05  # length of a vanishing line, in widths of the figure
+_ROUND: Final = tuple(digit * 10.0**power for power in range(3, 9) for digit in (1, 2, 5))  # m
+_KILOMETRES: Final = 10e3  # m, from which distances are written in kilometres
 
 
 def ray_diagram(
@@ -50,6 +63,7 @@ def ray_diagram(
     eye: tuple[float, float] | None = None,
     title: str = "",
     top: float | None = None,
+    surface: Surface = "ground",
     provenance: Provenance | None = None,
 ) -> Path:
     """Draw height against distance for many rays, with objects, profile and vanishing line.
@@ -69,6 +83,9 @@ def ray_diagram(
     title : str
     top : float, m, optional
         Upper end of the axis; found from the rays that turned and from the objects unless given.
+    surface : {"ground", "sea"}
+        What the heights are above: level ground, or the sea of a round Earth, over which rays turn of
+        themselves.
     provenance : Provenance, optional
         Kept in the file's metadata.
 
@@ -99,14 +116,14 @@ def ray_diagram(
             main = figure.add_subplot()
         else:
             side, main = figure.subplots(1, 2, sharey=True, width_ratios=[1, 4.6])
-            _draw_profile(side, profile, upper)
+            _draw_profile(side, profile, upper, surface)
         _draw_rays(main, rays)
         _draw_objects(main, objects, upper)
         if vanishing is not None:
             _draw_vanishing(main, np.asarray(vanishing[0]), np.asarray(vanishing[1]), upper)
-        _finish(figure, main, rays, objects, place, upper, title, with_label=profile is None)
+        _finish(figure, main, rays, objects, place, upper, title, surface, with_label=profile is None)
         if vanishing is not None:
-            _name_ground(main, np.asarray(vanishing[0]), place[0], upper)
+            _name_ground(main, np.asarray(vanishing[0]), place[0], upper, surface)
         buffer = io.BytesIO()
         figure.savefig(
             buffer, format=kind[1:], dpi=160, metadata=figure_metadata(kind, provenance or Provenance())
@@ -123,11 +140,11 @@ def _top(rays: Sequence[DiagramRay], objects: Sequence[Outline], eye: float) -> 
     return 1.15 * max(1.35 * eye, min(tallest, float(np.quantile(turned, 0.9))))
 
 
-def _draw_profile(axes: Axes, profile: Profile, upper: float) -> None:
+def _draw_profile(axes: Axes, profile: Profile, upper: float, surface: Surface) -> None:
     shown = profile.height <= 1.02 * upper
     axes.plot(1e6 * profile.refractivity[shown], profile.height[shown], color=_INK, lw=1.6)
     axes.set_xlabel("$(n-1)\\times 10^6$")
-    axes.set_ylabel("height above the ground (m)")
+    axes.set_ylabel(f"height above the {surface} (m)")
     axes.locator_params(axis="x", nbins=4)
     axes.margins(x=0.12)
     axes.spines[["top", "right"]].set_visible(False)
@@ -168,8 +185,13 @@ def _draw_rays(axes: Axes, rays: Sequence[DiagramRay]) -> None:
 
 
 def _draw_objects(axes: Axes, objects: Sequence[Outline], upper: float) -> None:
-    for outline in objects:
+    named: list[Outline] = []
+    for outline in sorted(objects, key=lambda one: -float(np.max(one.z))):
         axes.fill(outline.x, outline.z, facecolor=_OBJECT, edgecolor="#6d5430", lw=1.0, alpha=0.55, zorder=2)
+        # The parts of a ship stand at one place, where one name has room.
+        if any(one.x.max() >= outline.x.min() and outline.x.max() >= one.x.min() for one in named):
+            continue
+        named.append(outline)
         highest = float(np.max(outline.z))
         clipped = highest > 0.93 * upper
         middle = float(0.5 * (np.min(outline.x) + np.max(outline.x)))
@@ -195,6 +217,8 @@ def _draw_vanishing(axes: Axes, x: FloatArray, z: FloatArray, upper: float) -> N
     axes.fill_between(x, 0.0, z, color=_INK, alpha=0.10, lw=0, zorder=1.5)
     axes.plot(x, z, color=_INK, lw=2.0, zorder=4)
     axes.plot(x[0], z[0], "o", color=_INK, ms=4, zorder=5)
+    if x[-1] - x[0] < _WORTH_A_NAME * x[-1]:
+        return
     label = int(inside[int(0.8 * (inside.size - 1))])
     axes.annotate(
         "vanishing line: below it nothing is seen",
@@ -209,15 +233,13 @@ def _draw_vanishing(axes: Axes, x: FloatArray, z: FloatArray, upper: float) -> N
     )
 
 
-def _name_ground(axes: Axes, x: FloatArray, eye: float, upper: float) -> None:
+def _name_ground(axes: Axes, x: FloatArray, eye: float, upper: float, surface: Surface) -> None:
     """Say within the ground which part of it is seen, where the words have room."""
     if not x.size:
         return
     letter = _LETTER * float(np.ptp(axes.get_xlim()))
-    for begin, end, words in (
-        (eye, x[0], "the ground is seen"),
-        (x[0], x[-1], "“water”: no ground is seen"),
-    ):
+    unseen = "“water”: no ground is seen" if surface == "ground" else "no sea is seen"
+    for begin, end, words in ((eye, x[0], f"the {surface} is seen"), (x[0], x[-1], unseen)):
         if end - begin > len(words) * letter:
             axes.annotate(
                 words,
@@ -238,6 +260,7 @@ def _finish(
     eye: tuple[float, float],
     upper: float,
     title: str,
+    surface: Surface,
     *,
     with_label: bool,
 ) -> None:
@@ -246,7 +269,7 @@ def _finish(
     left = eye[0] - 0.03 * (far - eye[0])
     axes.set_xlim(left, far + 0.03 * (far - eye[0]))
     axes.set_ylim(-_STRIP * upper, upper)
-    axes.axhspan(-upper, 0.0, color=_GROUND, zorder=2.5, lw=0)
+    axes.axhspan(-upper, 0.0, color=_GROUND[surface], zorder=2.5, lw=0)
     axes.axhline(0.0, color="#8a744a", lw=1.0, zorder=4)
     axes.plot(*eye, marker="o", ms=7, mfc="white", mec=_INK, mew=1.5, zorder=7)
     axes.annotate(
@@ -259,9 +282,9 @@ def _finish(
         zorder=7,
         path_effects=_halo(),
     )
-    axes.set_xlabel("distance (m)")
+    _label_distances(axes, far)
     if with_label:
-        axes.set_ylabel("height above the ground (m)")
+        axes.set_ylabel(f"height above the {surface} (m)")
     else:
         axes.tick_params(labelleft=False)
     axes.spines[["top", "right"]].set_visible(False)
@@ -270,8 +293,8 @@ def _finish(
     shown = {ray.kind() for ray in rays}
     axes.legend(
         handles=[
-            Line2D([], [], color=_COLOURS[kind], lw=2.0, label=_NAMES[kind])
-            for kind in _NAMES
+            Line2D([], [], color=_COLOURS[kind], lw=2.0, label=name)
+            for kind, name in _NAMES[surface].items()
             if kind in shown
         ],
         loc="lower left",
@@ -298,6 +321,18 @@ def _finish(
         fontsize=8.5,
         color="#66727a",
     )
+
+
+def _label_distances(axes: Axes, far: float) -> None:
+    from matplotlib.ticker import FuncFormatter, MultipleLocator
+
+    if far < _KILOMETRES:
+        axes.set_xlabel("distance (m)")
+        return
+    axes.set_xlabel("distance (km)")
+    step = next(step for step in _ROUND if far < 10.0 * step)
+    axes.xaxis.set_major_locator(MultipleLocator(step))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda metres, _: f"{1e-3 * metres:g}"))
 
 
 def _halo() -> list[Any]:

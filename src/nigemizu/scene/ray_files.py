@@ -25,6 +25,8 @@ __all__ = ["save"]
 Coordinates: TypeAlias = tuple[float, float, float]
 Corners: TypeAlias = list[tuple[float, float]]
 
+_SHEET: Final = 0.004  # width of a ridge in the figure, in distances
+_HORIZONS: Final = 3.0  # reach over an empty sea, in distances of the horizon
 _DENSE: Final = 240  # rays of the bundle whose envelope is the vanishing line
 
 
@@ -75,14 +77,16 @@ def _draw(rays: TracedRays, path: Path, command: str) -> Path:
     reach = _reach(scene, outlines)
     lowest, highest = float(rays.elevation.min()), float(rays.elevation.max())
     dense = rays.traced_again(np.linspace(lowest, highest, _DENSE))
+    shown = _side_view(rays, reach)
     return ray_diagram(
         path,
-        rays=_side_view(rays, reach),
+        rays=shown,
         profile=_profile(rays),
         objects=outlines,
-        vanishing=vanishing_line(_side_view(dense, reach)),
+        vanishing=vanishing_line([*shown, *_side_view(dense, reach)]),
         eye=(0.0, scene.camera.eye[2]),
         title=scene.title,
+        surface="sea" if _is_round(scene) else "ground",
         provenance=Provenance(scene=scene.to_toml(), command=command),
     )
 
@@ -129,7 +133,20 @@ def _outlines(scene: Scene) -> list[Outline]:
         if 0.0 < distance <= _air_end(scene):
             x, z = np.array(corners, dtype=np.float64).T
             found.append(Outline(entry.kind, distance + x, place[2] + z))
-    return found
+    return found or (_coast(scene) if _is_round(scene) else [])
+
+
+def _coast(scene: Scene) -> list[Outline]:
+    """The nearest ridge, as a sheet: what is looked at over a round sea with nothing on it."""
+    from nigemizu.output import Outline
+    from nigemizu.render import Hills
+
+    ridges = [entry for entry in scene.objects if isinstance(entry, Hills)]
+    if not ridges:
+        return []
+    near = min(ridges, key=lambda ridge: ridge.distance)
+    x, z = np.array(_rectangle(_SHEET * near.distance, near.height)).T
+    return [Outline(near.kind, near.distance + x, near.base + z)]
 
 
 def _silhouette(entry: Object) -> tuple[Coordinates, Corners] | None:
@@ -164,6 +181,10 @@ def _along(scene: Scene, place: Coordinates) -> float:
     return float(offset @ ahead / np.linalg.norm(ahead))
 
 
+def _is_round(scene: Scene) -> bool:
+    return scene.earth is not None and not scene.earth.flat
+
+
 def _air_end(scene: Scene) -> float:
     if scene.profile is not None or scene.grid is None:
         return math.inf
@@ -172,6 +193,12 @@ def _air_end(scene: Scene) -> float:
 
 
 def _reach(scene: Scene, outlines: list[Outline]) -> float:
-    """How far the figure goes: a little beyond the last object, or to the end of the air."""
+    """How far the figure goes: a little beyond the last object, or to the end of the air.
+
+    Over a round sea with nothing on it the figure goes to three times the distance at which a straight ray
+    from the eye touches the sea.
+    """
     farthest = max((float(outline.x.max()) for outline in outlines), default=math.inf)
+    if math.isinf(farthest) and _is_round(scene) and scene.earth is not None:
+        return _HORIZONS * math.sqrt(2.0 * scene.earth.radius * scene.camera.eye[2])
     return min(_air_end(scene), 1.15 * farthest)
