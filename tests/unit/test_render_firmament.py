@@ -228,6 +228,80 @@ def test_blue_sky() -> None:
     assert chromaticity(horizon)[0] > x + 0.02  # whiter
 
 
+def zenith(depth: float, mu0: float, layers: int = 120) -> tuple[float, float]:
+    """Zenith of even air over black ground, all orders of scattering by molecules one after the other.
+
+    Returns π L/E, and the flux that comes down or goes back up over that which enters. Only the mean over
+    azimuth of the phase function is seen at the zenith: 3/8 ((3 − b²) + (3b² − 1) a²) for the sines a and b
+    of both elevations.
+    """
+    mu, weight = np.polynomial.legendre.leggauss(24)
+    mu, weight = 0.5 * (mu + 1), 0.5 * weight
+    a = np.append(mu, 1.0)
+    beam = np.exp(-np.linspace(0, depth, layers + 1) / mu0) * 3 / (32 * math.pi)
+    first = np.stack([beam * (3 - mu0**2), beam * (3 * mu0**2 - 1)])
+    even = first
+    step = depth / layers / a
+    left = np.exp(-step)
+    near = (1 - left) / step  # weights of a source that is linear between the nodes
+    for _ in range(25):
+        source = even[0][:, None] + even[1][:, None] * a**2
+        down, up = np.zeros_like(source), np.zeros_like(source)
+        for i in range(layers):
+            down[i + 1] = down[i] * left + source[i] * (near - left) + source[i + 1] * (1 - near)
+        for i in range(layers)[::-1]:
+            up[i] = up[i + 1] * left + source[i + 1] * (near - left) + source[i] * (1 - near)
+        light = 0.5 * (down + up)[:, :-1] * weight
+        whole, upright = light.sum(axis=1), light @ mu**2
+        even = first + 3 / 8 * np.stack([3 * whole - upright, 3 * upright - whole])
+    leaves = 2 * math.pi * ((down[-1] + up[0])[:-1] * mu * weight).sum() + mu0 * math.exp(-depth / mu0)
+    return math.pi * float(down[-1, -1]), float(leaves) / mu0
+
+
+@pytest.mark.parametrize("sun", [60.0, 20.0, 10.0])
+def test_scattering_of_all_orders(sun: float) -> None:
+    """At 650, 450 and 350 nm or so: depths 0.047, 0.205 and 0.56, as λ⁻⁴ from 0.092 at 550 nm."""
+    depths = 0.092 * (550 / np.array([[650], [450], [350]])) ** 4
+    exact, energy = np.array([zenith(float(depth), math.sin(math.radians(sun))) for depth in depths[:, 0]]).T
+    np.testing.assert_allclose(energy, 1.0, atol=1e-4)  # the yardstick loses no light
+    z, index, air = slab(1.0)
+    beta = depths * air.rayleigh
+    options: dict[str, Any] = {
+        "radius": FLAT, "eye": 0.0, "sun_elevation": math.radians(sun), "air": CLEAR, "ground_albedo": 0.0,
+        "depolarisation": 0.0, "elevation": [1.5, math.pi / 2], "azimuth": [0.0, 1.0],
+    }  # fmt: skip
+    found, once = (
+        firmament(z, index, Coefficients(beta, 0 * beta, 0 * beta), **options, multiple=often).radiance[
+            :, -1, 0
+        ]
+        for often in (True, False)
+    )
+    ratio = found / exact
+    assert np.all((ratio > 0.98) & (ratio < 1.05)), ratio  # what even second scattering costs
+    assert np.all(once < exact * 0.96)  # negative control
+    if sun == 60.0:
+        assert found[1] / found[0] == pytest.approx(exact[1] / exact[0], rel=0.02)
+        assert 3.9 < found[1] / found[0] < (650 / 450) ** 4  # less blue than thin air
+
+
+def test_noon_zenith_is_as_bright_as_published() -> None:
+    """Within a factor of 1.5 of the zenith that A. J. Preetham, P. Shirley and B. Smits fitted (1999).
+
+    doi:10.1145/311535.311545, appendix: T is the depth of molecules and aerosol over that of molecules. For a
+    low Sun the fit tends to 2 kcd/m², more than twice what molecules scatter, and is no yardstick.
+    """
+    h = np.concatenate([[0.0], np.geomspace(1.0, 86e3, 300)])
+    for air in (DEFAULT, Extinction(aerosol_depth=0.03)):
+        given = standard(air)[2]
+        middle = int(np.argmin(np.abs(BANDS.wavelength - 550e-9)))
+        molecules, aerosol = (float(np.trapezoid(part[middle], h)) for part in given[:2])
+        turbidity = 1 + aerosol / molecules
+        chi = (4 / 9 - turbidity / 120) * (math.pi - math.radians(60.0))
+        fitted = (4.0453 * turbidity - 4.9710) * math.tan(chi) - 0.2155 * turbidity + 2.4192
+        light = BANDS.rgb(sky(60.0, air, elevation=[1.5, math.pi / 2]).radiance[:, -1, 0]) @ LUMINANCE
+        assert 1 / 1.5 < 133.8 / math.pi * light / fitted < 1.5
+
+
 def test_sunset_is_red_and_twilight_blue() -> None:
     low = BANDS.rgb(seen(0.0).at(math.radians(1.0), 0.0))
     assert chromaticity(low)[0] > 0.42

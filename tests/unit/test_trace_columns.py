@@ -154,6 +154,51 @@ def test_agrees_with_the_march() -> None:
     np.testing.assert_allclose(rays.elevation[0], np.arctan2(way[2], way[0]), atol=2e-7)
 
 
+def growing(count: int, top: float) -> FloatArray:
+    """Heights [m] of layers that grow two hundredfold from the ground to the top."""
+    steps = np.cumsum(np.geomspace(1, 200, count))
+    return np.asarray(np.concatenate([[0.0], steps]) * (top / steps[-1]))
+
+
+def test_horizontal_refraction_of_exponential_air() -> None:
+    """n = 1 + 2.9e-4 e^(−h/8 km): 2354.1230″ at the horizon, by the integral of Auer and Standish."""
+
+    def air(height: FloatArray) -> tuple[FloatArray, FloatArray]:
+        excess = 2.9e-4 * np.exp(-height / 8e3)
+        return excess, -excess / 8e3
+
+    h = growing(2000, 120e3)
+    z = R * np.log1p(h / R)
+    angle, second = np.array([0.0, 0.02, 0.5]), math.radians(1 / 3600)
+    rays = column_rays(z, (1 + air(h)[0]) * np.exp(z / R), eye=0.0, elevation=angle, radius=R)
+    lifted = (angle - rays.true_elevation[0]) / second
+    integral = trace.astronomical_refraction(air, angle, radius=R, top=120e3) / second
+    assert integral[0] == pytest.approx(2354.1230, abs=1e-3)
+    np.testing.assert_allclose(lifted, integral, rtol=0, atol=5e-3)
+    # negative control: a hundredth less air is far outside
+    less = column_rays(z, (1 + 0.99 * air(h)[0]) * np.exp(z / R), eye=0.0, elevation=[0.0], radius=R)
+    assert lifted[0] + less.true_elevation[0, 0] / second > 20
+
+
+def test_air_mass_of_chapman() -> None:
+    """Columns along straight lines through e^(−h/8 km), over that to the zenith.
+
+    Chapman's grazing-incidence function for R/H = 796.375, by adaptive quadrature along the line itself.
+    """
+    h = growing(2000, 400e3)
+    z = R * np.log1p(h / R)
+    rays = column_rays(
+        z,
+        np.exp(z / R),
+        eye=0.0,
+        elevation=np.radians([30.0, 10.0, 5.0, 0.0]),
+        radius=R,
+        coefficients=[np.exp(-h / 8e3) / 8e3],
+    )
+    exact = [1.992576764804709, 5.5505200396358685, 10.140026354817039, 35.385319517709895]
+    np.testing.assert_allclose(rays.depth[0], exact, rtol=3e-6)
+
+
 def test_wavelengths_and_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     from nigemizu.trace import columns
 
