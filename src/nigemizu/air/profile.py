@@ -25,7 +25,7 @@ _GAUSS: Final = tuple(np.polynomial.legendre.leggauss(4))
 _BELOW: Final = 1e-6  # of a layer's width, below its upper break, where its own side is looked at
 _STEPS: Final = (1e-2, 10.0, 1e-6)  # K, Pa and 1: over which the law of refraction is differentiated
 _ROUNDS: Final = 14  # of halving nodes
-_MOST_NODES: Final = 50_000
+_MOST_NODES: Final = 200_000
 _EVEN, _MOIST = 250.0, 20_000.0  # m: so close are nodes up to where vapour counts
 _KINK: Final = 0.02  # m, from a jump of the gradient to the next nodes
 _CLOSEST: Final = (2.5e-5, 4e-7)  # m, and of the height: nodes that single precision tells apart
@@ -89,13 +89,11 @@ class Profile:
         height = self._first_nodes()
         object.__setattr__(self, "height", height)
         object.__setattr__(self, "temperature", self.course.value_and_slope(height)[0])
-        for wrong, words in (
-            (self.temperature <= 0, "0 K or less"),
-            (self.temperature > _HOTTEST, "a flame"),
-        ):
-            if np.any(wrong):
-                place, value = float(height[wrong][0]), float(self.temperature[wrong][0])
-                raise InputError(f"air of {words} at {place:g} m", key="profile", value=value)
+        wrong = ~((self.temperature > 0) & (self.temperature < _HOTTEST))
+        if np.any(wrong):
+            place, value = float(height[wrong][0]), float(self.temperature[wrong][0])
+            words = f"air of {'0 K or less' if value <= 0 else f'more than {_HOTTEST:g} K'} at {place:g} m"
+            raise InputError(words, key="profile", value=value)
         # Of dry air first; the vapour's fraction depends on the pressure only slightly.
         pressure = self._integrated(None)
         for _ in range(3 if self._moist else 0):
@@ -159,7 +157,7 @@ class Profile:
         Raises
         ------
         InputError
-            If that takes more than 50 000 nodes.
+            If it is not above 0, or takes more than 200 000 nodes.
 
         Notes
         -----
@@ -169,6 +167,7 @@ class Profile:
         """
         from nigemizu.air.atmosphere import Atmosphere
 
+        _check.checked(tolerance, "tolerance", "1/m above 0", above=0.0)
         index = LayeredIndex(self, Atmosphere(), None)
         low, high = self.height[:-1], self.height[1:]
         nodes = [self.height]

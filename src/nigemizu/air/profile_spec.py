@@ -31,7 +31,8 @@ _JOINING: Final = 200.0  # m, at most, over which the gradient above a table for
 _BLENDING: Final = 50.0  # m, above which a surface layer fades
 _THIN: Final = 2_000.0  # Pa at the ground: less is in hPa
 
-Numbers = tuple[float, ...]
+# What is no number is refused with its row, by `Rows`.
+Numbers = tuple[Annotated[float, Field(allow_inf_nan=True)], ...]
 
 
 class MeasuredAir(Protocol):
@@ -119,11 +120,11 @@ class ProfileSpec(Value):
     def _is_one_profile(self) -> Self:
         for name in ("heights", "temperatures", "pressures", "relative_humidities"):
             if getattr(self, name) and self.kind != "table":
-                raise InputError("goes with a table only", key=name, remedy='set kind = "table"')
+                raise InputError("goes with a table only", key=f"profile.{name}", remedy='set kind = "table"')
         if (self.file is not None) != (self.kind == "file"):
             raise InputError(
                 "is missing" if self.kind == "file" else "goes with a file only",
-                key="file",
+                key="profile.file",
                 remedy="name the sounding" if self.kind == "file" else 'set kind = "file"',
             )
         if self.kind == "table":
@@ -146,14 +147,18 @@ class ProfileSpec(Value):
                 remedy = None
                 if key == "relative_humidity" and self.kind == "table":
                     remedy = "give relative_humidities, one for each height"
-                raise InputError(f"belongs to {owner}", key=key, value=getattr(self, key), remedy=remedy)
+                raise InputError(
+                    f"belongs to {owner}", key=f"profile.{key}", value=getattr(self, key), remedy=remedy
+                )
         if self.pressures and self.surface_pressure is not None:
-            raise InputError("is given by the first of the pressures", key="surface_pressure")
+            raise InputError("is given by the first of the pressures", key="profile.surface_pressure")
 
     def _rows(self) -> Rows:
         return Rows(self.heights, self.temperatures, self.pressures, self.relative_humidities)
 
-    def build(self, earth: Earth, measured: MeasuredAir | None = None) -> Profile:
+    def build(
+        self, earth: Earth, measured: MeasuredAir | None = None, *, target: float | None = None
+    ) -> Profile:
         """The profile over an Earth.
 
         Parameters
@@ -162,11 +167,14 @@ class ProfileSpec(Value):
             Its gravity counts, unless the profile is a standard.
         measured : MeasuredAir, optional
             What was read from `file`.
+        target : float, m, optional
+            Height up to which there have to be data, not their continuation.
 
         Raises
         ------
         InputError
-            If the file has not been read, or data lie above `top`.
+            If the file has not been read, if what was read is no column of air, if data lie above `top` or
+            end below the target, or if pressures contradict the temperatures.
         """
         top = self.top or STANDARD_TOP["isa" if self.kind == "isa" else "us1976"]
         if self.kind in ("us1976", "isa"):
@@ -182,7 +190,15 @@ class ProfileSpec(Value):
             return Profile(course, humidity, "relative humidity", gravity=standard_gravity, **rest)
         if self.kind == "file" and measured is None:
             raise InputError("has not been read", key="profile.file", value=str(self.file))
-        return self._of_data(earth, top, measured)
+        profile = self._of_data(earth, top, measured)
+        if target is not None and target > profile.measured_top:
+            raise InputError(
+                f"the data end at {profile.measured_top:g} m, below the target",
+                key="profile",
+                value=target,
+                remedy="take a higher sounding or a lower target",
+            )
+        return profile
 
     def _of_data(self, earth: Earth, top: float, measured: MeasuredAir | None) -> Profile:
         """The profile through a table, or what was measured, and on up to the top."""

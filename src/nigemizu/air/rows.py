@@ -19,7 +19,7 @@ COLDEST, HOTTEST = 120.0, 400.0  # K: beyond these a temperature is in another u
 _CELSIUS: Final = 70.0  # numbers up to this may be degrees Celsius
 _LOWEST: Final = -5000.0  # m
 _TOP: Final = STANDARD_TOP["us1976"]
-_ODD: Final = 3.0  # times the pressure of the standard atmosphere, or a third of it: in no weather
+_ODD: Final = 8.0  # times the standard atmosphere's pressure, or an eighth of it: nowhere, under 86 km
 _LEAST: Final = 2  # rows
 _DIFFERENCE: Final = 0.05  # of the pressure
 
@@ -31,7 +31,12 @@ class Rows(NamedTuple):
     temperatures: Sequence[float] | FloatArray
     pressures: Sequence[float] | FloatArray = ()
     humidities: Sequence[float] | FloatArray = ()
-    names: tuple[str, str, str, str] = ("heights", "temperatures", "pressures", "relative_humidities")
+    names: tuple[str, str, str, str] = (
+        "profile.heights",
+        "profile.temperatures",
+        "profile.pressures",
+        "profile.relative_humidities",
+    )
     file: str | None = None
 
     def refuse(self) -> None:
@@ -138,7 +143,7 @@ def refuse_other_pressures(given: ArrayLike, at_rest: FloatArray) -> float:
     if off[row] > _DIFFERENCE:
         raise InputError(
             f"row {row + 1} is not what the weight of the air makes it, {at_rest[row]:.6g} Pa",
-            key="pressures",
+            key="profile.pressures",
             value=float(np.asarray(given)[row]),
             expected="within 5 % of it",
             remedy="check heights and temperatures, or leave the pressures out",
