@@ -86,7 +86,8 @@ class ProfileSpec(Value):
     surface_layer : SurfaceLayer, optional
         Air that the ground warms or cools while the wind mixes it; its `blending_height` is 50 m where it is
         not given. The profile is shifted, by a difference that fades over 3 km, to meet its air temperature.
-        Its ground is at height 0; down to there the lowest row of a table holds.
+        Its ground is at height 0 (and some 0.02 K off, as the shift and the profile's own gradient count down
+        to there); below the first row of a table that row holds.
     top : float, m
         Where the air ends; 86 km for the standard of 1976, 80 km for ISA.
 
