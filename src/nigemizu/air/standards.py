@@ -104,7 +104,7 @@ def standard_atmosphere(
     Examples
     --------
     >>> [float(part.round(4)) for part in standard_atmosphere(5000.0)]
-    [255.6755, 54048.2632, 0.7364]
+    [255.6755, 54048.2861, 0.7364]
     """
     if kind not in STANDARD_TOP:
         raise InputError("no such standard", key="kind", value=kind, expected=" or ".join(STANDARD_TOP))
