@@ -99,6 +99,17 @@ def test_nodes_of_n_serve_the_map_of_a_round_earth() -> None:
         assert (np.abs(cubic - slope) / (1e-12 + 1e-6 * np.abs(slope)))[wide].max() < 2.0
 
 
+@pytest.mark.parametrize("name", [*SPECS, "roundings that meet"])
+def test_nodes_stay_apart_in_single_precision(name: str) -> None:
+    """At 2.1 m two corners' roundings meet, but for the last bit; the volume refuses cells that thin."""
+    heights = (0.0, 0.1, 4.1, 11000.0)
+    meeting = ProfileSpec(kind="table", heights=heights, temperatures=TEMPERATURES, smoothing=4.0)
+    assert 0.1 + 2.0 != 4.1 - 2.0
+    profile = meeting.build(Earth()) if name not in SPECS else build(name)
+    z = Earth().conformal_height(profile.nodes()).astype(np.float32)
+    assert np.all(np.diff(z) > 0)
+
+
 def test_long_soundings_take_as_many_nodes_as_levels() -> None:
     heights = np.linspace(0.0, 30e3, 3001)
     noise = np.random.default_rng(7).normal(0.0, 0.05, len(heights))

@@ -106,9 +106,10 @@ class Profile:
 
     @property
     def breaks(self) -> FloatArray:
-        """Heights [m] at which the derivative of the temperature, or of the vapour, jumps."""
+        """Heights [m] at which a derivative of the temperature, or of the vapour, jumps."""
         breaks = np.unique(np.concatenate([self.course.breaks, self.vapour.breaks]))
-        return breaks[(breaks > self.base) & (breaks < self.top)]
+        breaks = breaks[(breaks > self.base) & (breaks < self.top)]
+        return breaks[np.diff(breaks, prepend=-np.inf) > _closest(breaks)]
 
     def at(self, height: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Temperature [K], pressure [Pa] and mole fraction of water vapour at heights [m].
@@ -172,8 +173,7 @@ class Profile:
         low, high = self.height[:-1], self.height[1:]
         nodes = [self.height]
         for _ in range(_ROUNDS):
-            closest = 4 * np.maximum(_CLOSEST[0], _CLOSEST[1] * high)
-            coarse = (_wrong(index, low, high, tolerance) > 1) & (high - low > closest)
+            coarse = (_wrong(index, low, high, tolerance) > 1) & (high - low > 4 * _closest(high))
             if not np.any(coarse):
                 break
             low, high = low[coarse], high[coarse]
@@ -209,7 +209,7 @@ class Profile:
         # Breaks stay; what is too close to them, or to its neighbour, is left out.
         ends = np.concatenate([[self.base], self.breaks, [self.top]])
         heights = heights[(heights > self.base) & (heights < self.top)]
-        closest = np.maximum(_CLOSEST[0], _CLOSEST[1] * np.abs(heights))
+        closest = _closest(heights)
         heights = heights[(_nearest(heights, ends) > closest) & (np.diff(heights, prepend=-np.inf) > closest)]
         return np.unique(np.concatenate([heights, ends]))
 
@@ -355,6 +355,11 @@ def _wrong(index: LayeredIndex, low: FloatArray, high: FloatArray, tolerance: fl
         slope = index(low + w * width)[1]
         worst = np.maximum(worst, np.abs(cubic - slope) / (tolerance + _RELATIVE * np.abs(slope)))
     return worst
+
+
+def _closest(heights: FloatArray) -> FloatArray:
+    """How near [m] to heights the next node may be."""
+    return np.maximum(_CLOSEST[0], _CLOSEST[1] * np.abs(heights))
 
 
 def _nearest(heights: FloatArray, ends: FloatArray) -> FloatArray:

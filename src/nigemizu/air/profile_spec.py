@@ -60,7 +60,7 @@ class ProfileSpec(Value):
     surface_temperature : float, K, optional
         Of a standard atmosphere at height 0: the difference to 288.15 K fades linearly to the tropopause.
     surface_pressure : float, Pa, optional
-        At the lowest height; unless given here or by the data, that of the standard atmosphere there.
+        At the lowest row, or height 0; unless given here or by the data, that of the standard there.
     relative_humidity : float, 1
         Of a standard atmosphere at height 0; falls linearly to 0 at 12 km.
     heights : list of float, m
@@ -93,9 +93,9 @@ class ProfileSpec(Value):
 
     Notes
     -----
-    Pressures follow from the temperatures, from that at the lowest height up: pressures of a table or
-    sounding that do not are overruled. Of a standard atmosphere gravity is the standard's; of tables and
-    soundings that of the Earth's latitude.
+    Pressures follow from the temperatures, from that at the lowest height up, which overrules measured ones;
+    `Profile.notes` says by how much they differ. Of a standard atmosphere gravity is the standard's; of
+    tables and soundings that of the Earth's latitude.
     """
 
     kind: Literal["us1976", "isa", "table", "file"] = "us1976"
@@ -177,6 +177,8 @@ class ProfileSpec(Value):
             If the file has not been read, if what was read is no column of air, if data lie above `top` or
             end below the target, or if pressures contradict the temperatures.
         """
+        if measured is not None and self.kind != "file":
+            raise InputError("has no use for what was measured", key="profile.kind", value=self.kind)
         top = self.top or STANDARD_TOP["isa" if self.kind == "isa" else "us1976"]
         if self.kind in ("us1976", "isa"):
             offset = 0.0 if self.surface_temperature is None else self.surface_temperature - 288.15
@@ -228,8 +230,11 @@ class ProfileSpec(Value):
         if len(levels) > len(heights):
             at_ground = at_first**2 / float(profile.at(first)[1])
             profile = Profile(course, humid, vapour_is, surface_pressure=at_ground, **rest)
-        if self.pressures:
-            off = refuse_other_pressures(pressures, profile.at(heights)[1])
+        if len(pressures):
+            at_rest = profile.at(heights)[1]
+            if self.pressures:
+                refuse_other_pressures(pressures, at_rest)
+            off = float(np.abs(pressures / at_rest - 1).max())
             note = f"pressures given differ by up to {off:.2%} from those of air at rest, which count"
             return replace(profile, notes=(*profile.notes, note))
         return profile

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from nigemizu.air.standards import STANDARD_TOP, standard_atmosphere
 from nigemizu.errors import InputError
@@ -136,16 +136,15 @@ class Rows(NamedTuple):
         return InputError(problem, key=key, value=shown, expected=expected, remedy=remedy, file=self.file)
 
 
-def refuse_other_pressures(given: ArrayLike, at_rest: FloatArray) -> float:
-    """Largest relative difference to the pressures of air at rest, or `InputError` beyond 5 %."""
-    off = np.abs(np.asarray(given) / at_rest - 1)
+def refuse_other_pressures(given: FloatArray, at_rest: FloatArray) -> None:
+    """Raise `InputError` if a pressure differs from that of air at rest by more than 5 %."""
+    off = np.abs(given / at_rest - 1)
     row = int(np.argmax(off))
     if off[row] > _DIFFERENCE:
         raise InputError(
             f"row {row + 1} is not what the weight of the air makes it, {at_rest[row]:.6g} Pa",
             key="profile.pressures",
-            value=float(np.asarray(given)[row]),
+            value=float(given[row]),
             expected="within 5 % of it",
             remedy="check heights and temperatures, or leave the pressures out",
         )
-    return float(off[row])
