@@ -43,6 +43,7 @@ def _generate(app: Sphinx) -> None:
         command_line,
         convection_page,
         python_api,
+        refraction_page,
         scene_reference,
         turbulence_page,
         validation,
@@ -57,6 +58,7 @@ def _generate(app: Sphinx) -> None:
     validation.write(parts / "validation.rst")
     convection_page.write(parts / "convection.rst", images / "convection.svg")
     turbulence_page.write(parts / "turbulence.rst", images / "turbulence.svg")
+    refraction_page.write(parts / "refraction.rst", images / "refraction.svg")
     arrival_page.write(parts, images)
 
 

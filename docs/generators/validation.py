@@ -12,7 +12,7 @@ from generators.flows import cavity, rolls
 from generators.text import heading, table, write_if_changed
 from nigemizu import air, field, heat, trace
 
-__all__ = ["write"]
+__all__ = ["Case", "row_of", "write"]
 
 ALPHA = 2.2e-5
 """Thermal diffusivity of the heat cases [m2/s]."""
@@ -41,13 +41,13 @@ def write(path: Path) -> None:
         wrong = [case.what for case in cases if not abs(case.obtained - case.expected) <= case.allowed]
         if wrong:
             raise AssertionError(f"validation fails for {', '.join(wrong)}")
-        rows = [_row(case) for case in cases]
+        rows = [row_of(case) for case in cases]
         header = ("case", "source", "expected", "obtained", "deviation", "allowed")
         text += heading(title, "-") + table(header, rows, (26, 26, 14, 14, 10, 10))
     write_if_changed(path, text)
 
 
-def _row(case: Case) -> tuple[str, ...]:
+def row_of(case: Case) -> tuple[str, ...]:
     unit = f" {case.unit}" if case.unit else ""
     return (
         case.what,

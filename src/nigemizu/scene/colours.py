@@ -73,6 +73,7 @@ class Colours:
         temperature, pressure, _ = far.profile.at(heights)
         z = far.earth.conformal_height(heights)
         bare = far.profile.refractivity(heights, far.atmosphere, chosen.wavelength).T
+        bare = np.broadcast_to(bare, (len(chosen), len(z)))  # laws without colours have one row
         if scene.tracer.method == "straight":
             bare = np.zeros_like(bare)
         index = (1 + bare) * far.earth.stretch(z)

@@ -158,10 +158,12 @@ def trace(
 def _trace_through(
     scene: Scene, air: AirVolume, elevation: FloatArray, azimuth: FloatArray, variant: Variant, *, paths: bool
 ) -> TracedRays:
+    from nigemizu.render import Light
     from nigemizu.trace import RayStatus
 
     directions = _directions(scene, elevation, azimuth)
-    end, points = _follow(scene, Studio(scene, variant), air, directions, paths)
+    unlit = scene.model_copy(update={"light": Light(sky="constant")})  # what lights the objects does not count
+    end, points = _follow(scene, Studio(unlit, variant), air, directions, paths)
     there, ahead, length, points = _in_the_world(scene, end, points)
 
     return TracedRays(
