@@ -176,6 +176,19 @@ def test_the_gradient_joins_above_the_data(smoothing: float | None, joins: bool)
     assert (100.0 in profile.course.kinks) != joins
 
 
+def test_a_long_last_interval_joins_within_some_hundred_metres() -> None:
+    """B x exp(−x/ℓ) with ℓ = 200 m, B the jump of the slope from −26.055/4950 K/m without a joining."""
+    spec = ProfileSpec(kind="table", heights=(0.0, 50.0, 5000.0), temperatures=(280.0, 281.0, 254.945))
+    smooth = spec.build(Earth())
+    kinked = spec.model_copy(update={"smoothing": 0.0}).build(Earth())
+    x = np.array([200.0, 400.0, 3000.0])
+    bend = smooth.at(5000.0 + x)[0] - kinked.at(5000.0 + x)[0]
+    assert bend[1] / bend[0] == pytest.approx(2.0 * np.exp(-1.0), rel=1e-6)
+    above = kinked.course.value_and_slope(np.array([5000.0]))[1][0]
+    assert bend[0] == pytest.approx((-26.055 / 4950.0 - above) * 200.0 / np.e, rel=1e-6)
+    assert abs(bend[2]) < 1e-4
+
+
 def test_layers_are_what_their_numbers_say() -> None:
     heights = np.array([0.0, 30.0, 300.0])
     step = Inversion(jump=6.0, height=30.0, thickness=4.0)
