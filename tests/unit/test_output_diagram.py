@@ -9,6 +9,8 @@ from PIL import Image
 
 from nigemizu.errors import InputError
 from nigemizu.output import DiagramRay, Outline, Profile, Provenance, ray_diagram, vanishing_line
+from nigemizu.scene import Scene
+from nigemizu.scene.ray_files import _outlines, _reach
 
 X = np.linspace(0.0, 600.0, 1201)
 EYE = 1.6
@@ -175,3 +177,25 @@ def test_refused(tmp_path):
     (tmp_path / "file").write_text("a file")
     with pytest.raises(InputError, match="Not a directory"):
         ray_diagram(tmp_path / "file" / "rays.svg", rays=[ray(0.002)])
+
+
+@pytest.mark.parametrize(
+    ("name", "kilometres"),
+    [
+        ("fata-morgana", 18.5),  # 1.15 times the 16.093 km to the ship; the coast behind it does not count
+        ("looming", 51.8),  # of the 45 km to the coast
+        ("sunset-mock", 83.0),  # three times sqrt(2 · 6378.14 km · 60 m) = 27.67 km
+    ],
+)
+def test_how_far_the_figure_goes(name, kilometres):
+    scene = Scene.load(name)
+    assert _reach(scene, _outlines(scene)) == pytest.approx(1e3 * kilometres, rel=3e-3)
+
+
+def test_a_coast_is_what_is_looked_at_where_nothing_else_is():
+    scene = Scene.load("looming")
+    (coast,) = _outlines(scene)
+    assert (coast.name, coast.z.min(), coast.z.max()) == ("hills", 0.0, 75.0)
+    assert coast.x.mean() == pytest.approx(45e3, rel=1e-9)
+    assert "hills" not in {one.name for one in _outlines(Scene.load("fata-morgana"))}
+    assert "hills" not in {one.name for one in _outlines(Scene.load("pyramid"))}
