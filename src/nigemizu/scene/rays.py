@@ -162,7 +162,8 @@ def _trace_through(
     from nigemizu.trace import RayStatus
 
     directions = _directions(scene, elevation, azimuth)
-    unlit = scene.model_copy(update={"light": Light(sky="constant")})  # what lights the objects does not count
+    # What lights the objects does not count.
+    unlit = scene.model_copy(update={"light": Light(sky="constant")})
     end, points = _follow(scene, Studio(unlit, variant), air, directions, paths)
     there, ahead, length, points = _in_the_world(scene, end, points)
 
