@@ -58,10 +58,10 @@ class SurfaceLayer(Value):
     sublayer; it ends at e·zh in neutral air. Temperature and its gradient are continuous everywhere.
 
     Limits: flat, uniform, dry ground and steady wind. The logarithm ends at some tens of metres, or at a few
-    times the size of L: higher up give `blending_height`. Stable air is refused where z/L exceeds 6 at a height
-    that was given; over a cold sea in a light wind, give the wind from lower down. Molecules carry no more heat
-    than k dT/dz: the line is true to them if zh is about D/(e κ u*), D being the thermal diffusivity
-    (2.2e-5 m² s⁻¹).
+    times the size of L: higher up give `blending_height`. Stable air is refused where z/L exceeds 6 at a
+    height that was given; over a cold sea in a light wind, give the wind from lower down. Molecules carry no
+    more heat than k dT/dz: the line is true to them if zh is about D/(e κ u*), D being the thermal
+    diffusivity (2.2e-5 m² s⁻¹).
 
     References
     ----------
