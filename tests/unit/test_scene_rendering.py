@@ -33,7 +33,8 @@ def told(worst: float, overrides: dict[str, Any], strays: float = 0.0) -> list[s
     ("worst", "overrides", "warned"),
     [
         (0.099, {}, False),
-        (0.11, {}, True),
+        (0.12, {}, False),
+        (0.14, {}, True),
         (0.11, {"accuracy": 0.2}, False),
         (0.02, {"accuracy": 0.01}, True),
         (0.9, {"step": 4.0}, False),
@@ -58,7 +59,7 @@ def test_an_accuracy_in_radians_is_counted_in_pixels() -> None:
     pixel = Scene.load("pyramid").camera.pixel_angle
     radians = {"accuracy": 0.1 * pixel, "accuracy_unit": "radian"}
     assert told(0.099, radians) == []
-    assert "where 0.1 were asked for" in told(0.11, radians)[0]
+    assert "where 0.1 were asked for" in told(0.14, radians)[0]
 
 
 @pytest.mark.parametrize(

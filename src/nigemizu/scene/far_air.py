@@ -24,6 +24,8 @@ _REACH: Final = 3e6  # m beyond the mesh over which its horizontal mean goes on
 _JOIN: Final = 3e-6  # by how much mesh and layers may differ where they meet: 3 K
 _PER_KELVIN: Final = 0.9e-6  # of refractivity, near the ground
 _APART: Final = 0.5  # of the mesh's uppermost cell, to the first layer above it
+_NEAR: Final = 1.0  # m, below which nodes are thinned,
+_CLOSEST: Final = 0.04  # to so many of their heights: slopes of a logarithm are then right to some 1e-6
 _VACUUM_NODES: Final = 400
 
 
@@ -67,7 +69,7 @@ class FarAir:
 
     def alone(self) -> AirVolume:
         """Air that is all in layers."""
-        heights = self.profile.nodes()
+        heights = _thinned(self.profile.nodes(), self.profile.breaks)
         bent = self.profile.refractivity(heights, self.atmosphere)
         return self._volume(heights, bent, self.profile.at(heights)[0])
 
@@ -147,6 +149,15 @@ class FarAir:
 
     def _stretch(self, z: FloatArray) -> FloatArray:
         return self.earth.stretch(z)[:, None, None]
+
+
+def _thinned(heights: FloatArray, breaks: FloatArray) -> FloatArray:
+    """Nodes near the ground no closer than a part of their height: each costs grazing rays a step."""
+    kept = [float(heights[0])]
+    for height in heights[1:]:
+        if height - kept[-1] >= _CLOSEST * height or height > _NEAR or height in breaks:
+            kept.append(float(height))
+    return np.array(kept)
 
 
 def _require_reach(scene: Scene, profile: Profile) -> None:
