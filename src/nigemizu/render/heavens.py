@@ -11,7 +11,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Disc", "Heavens", "elevation_nodes"]
+__all__ = ["COLUMNS", "Disc", "Heavens", "elevation_nodes"]
 
 FloatArray = NDArray[np.float64]
 
@@ -48,12 +48,6 @@ def elevation_nodes(low: float, count: int = ROWS) -> FloatArray:
     return np.asarray(np.sinh(np.linspace(first, last, count)) * FINEST)
 
 
-def azimuth_nodes(count: int = COLUMNS) -> FloatArray:
-    """Azimuths from the Sun [rad], from 0 to π: dense about the Sun."""
-    nodes: FloatArray = np.linspace(0, 1, count) ** 2 * math.pi
-    return nodes
-
-
 @final
 class Heavens:
     """Sun, Moon and sky as one wavelength shows them.
@@ -63,7 +57,7 @@ class Heavens:
     low : float, rad
         Lowest apparent elevation of the tables.
     sky : (ROWS, COLUMNS) float64
-        Radiance at `elevation_nodes` and `azimuth_nodes`.
+        Radiance at `elevation_nodes` and `nigemizu.render.firmament.azimuth_nodes`.
     transmission : (ROWS,) float64, 1
         Of the air, to space.
     bodies : sequence of Disc
@@ -129,7 +123,7 @@ class Heavens:
             Apparent elevation at the eye.
         """
         row, fraction = self._row(elevation)
-        clear = _between(self._transmission, row, 1, fraction, active)
+        clear = _between(self._transmission, row, fraction, active)
         light = self._glow(row, fraction, direction, active)
         for body in self._bodies:
             light += clear * body.radiance(direction, active)
@@ -168,8 +162,8 @@ class Heavens:
         column = dr.minimum(mi.UInt32(place), COLUMNS - 2)
         across = place - mi.Float(column)
         first = row * COLUMNS + column
-        below = _between(self._sky, first, 1, across, active)
-        above = _between(self._sky, first + COLUMNS, 1, across, active)
+        below = _between(self._sky, first, across, active)
+        above = _between(self._sky, first + COLUMNS, across, active)
         return dr.lerp(below, above, fraction)
 
 
@@ -190,7 +184,7 @@ class _Body:
         on_disc = active & (towards > 0) & (distance < 1)
         place = dr.minimum(distance, 1) * self._last
         step = dr.minimum(mi.UInt32(place), self._last - 1)
-        light = _between(self._radiance, step, 1, place - mi.Float(step), on_disc)
+        light = _between(self._radiance, step, place - mi.Float(step), on_disc)
         if self._lit is not None:
             rise = dr.sqrt(dr.maximum(1 - distance * distance, 0))
             normal = away * self._inverse - self._direction * rise
@@ -200,8 +194,8 @@ class _Body:
         return dr.select(on_disc, light, 0)
 
 
-def _between(table: Any, first: Any, step: int, fraction: Any, active: Any) -> Any:
-    one, other = (dr.gather(mi.Float, table, index, active) for index in (first, first + step))
+def _between(table: Any, first: Any, fraction: Any, active: Any) -> Any:
+    one, other = (dr.gather(mi.Float, table, index, active) for index in (first, first + 1))
     return dr.lerp(one, other, fraction)
 
 

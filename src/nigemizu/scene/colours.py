@@ -64,8 +64,8 @@ class Colours:
     @classmethod
     def of(cls, scene: Scene, far: FarAir, light: Light, eye: float) -> Self:
         """What is seen from an eye at a conformal height [m]."""
-        from nigemizu.render.firmament import firmament
-        from nigemizu.render.heavens import azimuth_nodes, elevation_nodes
+        from nigemizu.render.firmament import azimuth_nodes, firmament
+        from nigemizu.render.heavens import COLUMNS, elevation_nodes
         from nigemizu.render.spectrum import bands
 
         chosen = bands(light.wavelengths)
@@ -82,7 +82,6 @@ class Colours:
         # The horizon: the ray that grazes the ground, or where n′ is least below the eye.
         least = np.minimum(index[:, z <= eye].min(axis=1), at_eye)
         low = -float(np.arccos(least / at_eye).min()) + _MARGIN
-        elevation, azimuth = elevation_nodes(low), azimuth_nodes()
         made = firmament(
             z,
             index,
@@ -92,8 +91,8 @@ class Colours:
             sun_elevation=math.radians(light.sun_elevation),
             air=light.extinction,
             ground_albedo=_SEA,
-            elevation=elevation,
-            azimuth=azimuth,
+            elevation=elevation_nodes(low),
+            azimuth=azimuth_nodes(COLUMNS),
         )
         fall = int(np.argmax(pressure < pressure[0] / math.e))
         colours = cls(
@@ -105,7 +104,7 @@ class Colours:
             haze=np.stack([coefficients.rayleigh[:, 0], coefficients.aerosol[:, 0]], axis=1),
             scales=(float(heights[fall]), light.extinction.aerosol_height),
         )
-        colours._warn_of_hidden_sun(elevation)
+        colours._warn_of_hidden_sun()
         return colours
 
     def __len__(self) -> int:
@@ -145,13 +144,7 @@ class Colours:
         irradiance = into_gamut(math.pi * np.einsum("k,kc->c", clear, self.bands.to_rgb))
         azimuth = math.radians(self.light.sun_azimuth)
         towards = _direction(azimuth, max(apparent, 1e-3))
-        return baked_table(table, self._elevation, azimuth, towards, irradiance)
-
-    @property
-    def _elevation(self) -> FloatArray:
-        from nigemizu.render.heavens import elevation_nodes
-
-        return elevation_nodes(self.low)
+        return baked_table(table, self.firmament.elevation, azimuth, towards, irradiance)
 
     def _sunlight(self) -> tuple[float, FloatArray]:
         """Apparent elevation [rad] of the Sun, and the part of the light of its disc that arrives, (K,)."""
@@ -171,7 +164,7 @@ class Colours:
         known = np.isfinite(true[middle])
         apparent = np.interp(
             math.radians(self.light.sun_elevation),
-            *_rising(true[middle], np.where(known, self._elevation, np.nan)),
+            *_rising(true[middle], np.where(known, self.firmament.elevation, np.nan)),
         )
         return float(apparent), arrived
 
@@ -192,7 +185,7 @@ class Colours:
             found.append(Disc(towards, math.radians(moon.diameter / 2), bright, _lit(moon, towards)))
         return found
 
-    def _warn_of_hidden_sun(self, elevation: FloatArray) -> None:
+    def _warn_of_hidden_sun(self) -> None:
         from nigemizu.render.sun import SUN_RADIUS
 
         true = self.firmament.true_elevation[len(self) // 2]
