@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,14 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nigemizu.errors import InputError
-from nigemizu.output.figures import figure_file, figure_metadata
-from nigemizu.output.files import write_bytes
+from nigemizu.output.figures import figure_file, write_figure
 from nigemizu.output.provenance import Provenance
 from nigemizu.output.side_view import Profile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 __all__ = ["RefractionFigure", "TransferFigure", "refraction_figure", "transfer_figure"]
 
@@ -146,7 +143,7 @@ def transfer_figure(path: str | Path, shown: TransferFigure, *, provenance: Prov
         _draw_transfer(main, shown, window)
         if shown.title:
             figure.suptitle(shown.title, fontsize=12.5, weight="bold", x=0.012, ha="left")
-        return _written(figure, target, kind, provenance)
+        return write_figure(figure, target, kind, provenance)
 
 
 def refraction_figure(
@@ -189,14 +186,7 @@ def refraction_figure(
         _draw_refraction(figure.add_subplot(), shown)
         if shown.title:
             figure.suptitle(shown.title, fontsize=12.5, weight="bold", x=0.012, ha="left")
-        return _written(figure, target, kind, provenance)
-
-
-def _written(figure: Figure, target: Path, kind: str, provenance: Provenance | None) -> Path:
-    buffer = io.BytesIO()
-    metadata = figure_metadata(kind, provenance or Provenance())
-    figure.savefig(buffer, format=kind[1:], dpi=160, metadata=metadata)
-    return write_bytes(target, buffer.getvalue())
+        return write_figure(figure, target, kind, provenance)
 
 
 def _window(shown: TransferFigure) -> tuple[float, float, float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias
@@ -11,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from nigemizu.errors import InputError
-from nigemizu.output.figures import figure_file, figure_metadata
-from nigemizu.output.files import write_bytes
+from nigemizu.output.figures import figure_file, write_figure
 from nigemizu.output.provenance import Provenance
 from nigemizu.output.side_view import DiagramRay, Outline, Profile
 
@@ -124,11 +122,7 @@ def ray_diagram(
         _finish(figure, main, rays, objects, place, upper, title, surface, with_label=profile is None)
         if vanishing is not None:
             _name_ground(main, np.asarray(vanishing[0]), place[0], upper, surface)
-        buffer = io.BytesIO()
-        figure.savefig(
-            buffer, format=kind[1:], dpi=160, metadata=figure_metadata(kind, provenance or Provenance())
-        )
-    return write_bytes(target, buffer.getvalue())
+        return write_figure(figure, target, kind, provenance)
 
 
 def _top(rays: Sequence[DiagramRay], objects: Sequence[Outline], eye: float) -> float:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from nigemizu.output.figures import figure_file, figure_metadata
-from nigemizu.output.files import write_bytes
+from nigemizu.output.figures import figure_file, write_figure
 from nigemizu.output.pictures import encoded
 from nigemizu.output.provenance import Provenance
 
@@ -93,10 +91,7 @@ def displacement_figure(
             axes.set_yticks([])
         if title:
             figure.suptitle(title, fontsize=11, weight="bold", x=0.012, ha="left")
-        buffer = io.BytesIO()
-        metadata = figure_metadata(kind, provenance or Provenance())
-        figure.savefig(buffer, format=kind[1:], dpi=160, metadata=metadata)
-    return write_bytes(target, buffer.getvalue())
+        return write_figure(figure, target, kind, provenance)
 
 
 def _span(lengths: NDArray[np.float64]) -> float:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from nigemizu.errors import InputError
+from nigemizu.output.files import write_bytes
 from nigemizu.output.provenance import Provenance
 
-__all__ = ["figure_file", "figure_metadata"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["figure_file", "write_figure"]
 
 
 def figure_file(path: str | Path) -> tuple[Path, str]:
@@ -22,7 +27,7 @@ def figure_file(path: str | Path) -> tuple[Path, str]:
     return target, kind
 
 
-def figure_metadata(kind: str, provenance: Provenance) -> dict[str, Any]:
+def _metadata(kind: str, provenance: Provenance) -> dict[str, Any]:
     """What made a figure, in the fields of its kind; without dates, so that equal figures are equal files."""
     fields = provenance.fields()
     if kind == ".png":
@@ -31,3 +36,11 @@ def figure_metadata(kind: str, provenance: Provenance) -> dict[str, Any]:
     if kind == ".svg":
         return {"Creator": provenance.software, "Date": None, "Description": about}
     return {"Creator": provenance.software, "CreationDate": None, "Subject": about}
+
+
+def write_figure(figure: Figure, target: Path, kind: str, provenance: Provenance | None) -> Path:
+    """Write a figure to the file and of the kind that `figure_file` gave, whole or not at all."""
+    buffer = io.BytesIO()
+    metadata = _metadata(kind, provenance or Provenance())
+    figure.savefig(buffer, format=kind[1:], dpi=160, metadata=metadata)
+    return write_bytes(target, buffer.getvalue())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias, final
 import numpy as np
 from numpy.typing import NDArray
 
-from nigemizu.output.figures import figure_file, figure_metadata
-from nigemizu.output.files import write_bytes
+from nigemizu.output.figures import figure_file, write_figure
 from nigemizu.output.provenance import Provenance
 
 if TYPE_CHECKING:
@@ -112,11 +110,7 @@ def shimmer_figure(path: str | Path, shown: ShimmerFigure, *, provenance: Proven
         _draw_spectrum(lower_right, shown)
         if shown.title:
             figure.suptitle(shown.title, fontsize=12.5, weight="bold", x=0.012, ha="left")
-        buffer = io.BytesIO()
-        figure.savefig(
-            buffer, format=kind[1:], dpi=160, metadata=figure_metadata(kind, provenance or Provenance())
-        )
-    return write_bytes(target, buffer.getvalue())
+        return write_figure(figure, target, kind, provenance)
 
 
 def _draw_tiles(figure: Figure, axes: Axes, shown: ShimmerFigure) -> None:
