@@ -25,7 +25,6 @@ from nigemizu.heat import (
     Wind,
     convect,
 )
-from nigemizu.heat.flow import kernels
 from nigemizu.heat.flow.moving import MovingAir
 from nigemizu.heat.flow.running import DivergedError
 from nigemizu.scene import Scene
@@ -132,10 +131,10 @@ def test_eddy_viscosity_is_that_of_vreman() -> None:
     """Against his equations written out in NumPy; none in laminar shear."""
     air = MovingAir(GRID, Convection(), HOT, Sides(), Top(), 2.2e-5)
     air.set(np.full(GRID.shape, 300.0), tuple(np.random.default_rng(5).standard_normal((3, *GRID.shape))))  # type: ignore[arg-type]
-    air._update_viscosity()
+    air.longest_step()
     k, j, i = 5, 6, 4
-    dx, dy, dz = 0.25, 0.25, air._dz
-    u, v, w = air.u, air.v, air.w
+    dx, dy, dz = 0.25, 0.25, air.cells.metric.dz
+    u, v, w, _ = air.cells.fields
     rise = 0.5 * dz[k - 1] + dz[k] + 0.5 * dz[k + 1]
 
     def middle(field: Any, axis: int) -> Any:
@@ -155,14 +154,14 @@ def test_eddy_viscosity_is_that_of_vreman() -> None:
         b[0, 0] * b[1, 1] - b[0, 1] ** 2 + b[0, 0] * b[2, 2] - b[0, 2] ** 2 + b[1, 1] * b[2, 2] - b[1, 2] ** 2
     )
     expected = 1.57e-5 + 0.07 * np.sqrt(size / np.sum(a * a))
-    assert abs(air._nu[k, j, i] / expected - 1) < 1e-12
+    assert abs(air.cells.viscosity[k, j, i] / expected - 1) < 1e-12
     assert expected > 1e-3
 
-    for field in (air.u, air.v, air.w):
-        field[:] = 0.0
-    air.u[:] = np.arange(len(air.u))[:, None, None]
-    kernels.eddy_viscosity(0, 8, air.u, air.v, air.w, air._nu, 1e-5, 0.07, 4.0, 4.0, air._dz, air._rdz)
-    assert np.all(air._nu[2:-2, 2:-2, 2:-2] < 1.001e-5)
+    sheared = np.broadcast_to(np.arange(8.0)[:, None, None], GRID.shape)
+    still = np.zeros(GRID.shape)
+    air.cells.put((sheared, still, still), still + 300.0)
+    air.longest_step()
+    assert np.all(air.cells.viscosity[2:-2, 2:-2, 2:-2] < 1.6e-5)
 
 
 def test_a_flow_that_blows_up_names_its_last_checkpoint(
@@ -173,7 +172,7 @@ def test_a_flow_that_blows_up_names_its_last_checkpoint(
     def explode(self: MovingAir, *args: Any) -> None:
         ordinary(self, *args)
         if self.time > 1.2:
-            self.u[4, 4, 4] = np.nan
+            self.cells.fields[0][4, 4, 4] = np.nan
 
     monkeypatch.setattr(MovingAir, "advance", explode)
     with pytest.raises(DivergedError, match=r"blown up at 1\.[0-9]+ s; its last sound state, at (0\.9|1)"):

@@ -32,7 +32,7 @@ ROOMS: dict[str, set[str]] = {
 
 OUTSIDE: dict[str, set[str]] = {
     "air": {"numpy", "pydantic"},
-    "heat": {"PIL", "numba", "numpy", "pydantic", "pydantic_core", "scipy", "xarray"},
+    "heat": {"PIL", "drjit", "numba", "numpy", "pydantic", "pydantic_core", "scipy", "xarray"},
     "field": {"drjit", "numpy", "pydantic", "scipy"},
     "trace": {"drjit", "numpy", "pydantic"},
     "render": {"PIL", "drjit", "mitsuba", "numpy", "pydantic", "pydantic_core", "xarray"},

@@ -231,9 +231,11 @@ def _work(parser: argparse.ArgumentParser) -> None:
 def _light(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--air", metavar="AIR", help="take the air from this dataset (.zarr, .nc)")
     parser.add_argument("--method", choices=("bent", "straight", "layered"), help="how light travels")
-    parser.add_argument(
-        "--variant", choices=("auto", "llvm", "cuda"), default="auto", help="compute device (default: auto)"
-    )
+    _device(parser, "compute device (default: auto)")
+
+
+def _device(parser: argparse.ArgumentParser, text: str) -> None:
+    parser.add_argument("--variant", choices=("auto", "llvm", "cuda"), default="auto", help=text)
 
 
 def _picture(parser: argparse.ArgumentParser) -> None:
@@ -278,6 +280,7 @@ def _animate(parser: argparse.ArgumentParser) -> None:
 
 def _simulate(parser: argparse.ArgumentParser) -> None:
     _work(parser)
+    _device(parser, "where air moves by itself: llvm is the processor, cuda a graphics card (default: auto)")
     parser.add_argument("-o", "--output", metavar="OUT", help="dataset to write, .zarr or .nc (SCENE.zarr)")
     parser.add_argument("--duration", type=_seconds, metavar="SECONDS", help="end of the simulated time")
     parser.add_argument("--every", type=_seconds, metavar="SECONDS", help="time between stored instants")

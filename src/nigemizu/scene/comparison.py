@@ -35,7 +35,7 @@ def compare(
 
     path = ready_to_write(path, (".png",))
     scene.check()
-    volume = air_at(scene, time, air, progress)
+    volume = air_at(scene, time, air, progress, variant)
     pictures = {
         method: scene.render(time, air=volume, method=method, variant=variant, progress=progress)
         for method in _methods(scene)

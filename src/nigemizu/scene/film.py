@@ -74,7 +74,7 @@ def animate(
     missing = _missing(folder, truths)
     progress.start("frames", folder.count)
     progress.advance(folder.count - len(missing))
-    jobs = _jobs(scene, folder, missing, air, truths)
+    jobs = _jobs(scene, folder, missing, air, truths, variant)
     if workers == 1:
         outcomes = _render_here(scene, jobs, variant, progress)
     else:
@@ -122,7 +122,12 @@ def _missing(folder: FrameFolder, truths: Path | None) -> list[int]:
 
 
 def _jobs(
-    scene: Scene, folder: FrameFolder, missing: Sequence[int], air: AirSource, truths: Path | None
+    scene: Scene,
+    folder: FrameFolder,
+    missing: Sequence[int],
+    air: AirSource,
+    truths: Path | None,
+    variant: Variant,
 ) -> Iterator[_Job]:
     """The frames that are missing, with their air.
 
@@ -139,7 +144,8 @@ def _jobs(
     each = len(exposures[0])
     times = tuple(itertools.chain(*exposures[: missing[-1] + 1]))
     kept = _air_folder(folder.path)
-    instants = air_instants(scene, times, air, SILENT, first=each * missing[0], folder=kept)
+    first = each * missing[0]
+    instants = air_instants(scene, times, air, SILENT, first=first, folder=kept, variant=variant)
     for index in range(missing[0], missing[-1] + 1):
         airs = tuple(itertools.islice(instants, each))
         if index in wanted:

@@ -154,7 +154,11 @@ class Scene(Sections):
         check(self, available)
 
     def simulate(
-        self, times: Iterable[float] | None = None, *, progress: ProgressMeter = SILENT
+        self,
+        times: Iterable[float] | None = None,
+        *,
+        variant: Variant = "auto",
+        progress: ProgressMeter = SILENT,
     ) -> xarray.Dataset:
         """Heat the air.
 
@@ -162,6 +166,8 @@ class Scene(Sections):
         ----------
         times : iterable of float, s, optional
             Instants to keep; those of `time` unless given.
+        variant : {"auto", "llvm", "cuda"}
+            Where air moves by itself: on the processor (``llvm``), or on a graphics card.
         progress : ProgressMeter
             Receives how far the work has come.
 
@@ -173,10 +179,16 @@ class Scene(Sections):
         """
         from nigemizu.scene import running
 
-        return running.simulate(self, self.time.stored if times is None else tuple(times), progress)
+        instants = self.time.stored if times is None else tuple(times)
+        return running.simulate(self, instants, progress, variant)
 
     def save_air(
-        self, path: str | os.PathLike[str], *, command: str = "", progress: ProgressMeter = SILENT
+        self,
+        path: str | os.PathLike[str],
+        *,
+        variant: Variant = "auto",
+        command: str = "",
+        progress: ProgressMeter = SILENT,
     ) -> Path:
         """Heat the air and write it to ``.zarr`` or ``.nc``, instant by instant.
 
@@ -184,7 +196,7 @@ class Scene(Sections):
         """
         from nigemizu.scene import running
 
-        return running.save_air(self, Path(path), command, progress)
+        return running.save_air(self, Path(path), command, progress, variant)
 
     def air_at(
         self,

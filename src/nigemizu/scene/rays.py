@@ -151,7 +151,7 @@ def trace(
     scene.check()
     elevation, azimuth = _fan(scene, elevations, azimuths)
     # Straight light needs no air to travel, but the diagram shows the profile beside it all the same.
-    volume = air_at(scene, time, air, progress)
+    volume = air_at(scene, time, air, progress, variant)
     return _trace_through(scene, volume, elevation, azimuth, variant, paths=paths)
 
 

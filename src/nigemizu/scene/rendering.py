@@ -263,7 +263,7 @@ def render(
     """See `nigemizu.scene.Scene.render`."""
     scene.check()
     studio = Studio(scene, variant)
-    airs = _airs(scene, time, air, progress)
+    airs = _airs(scene, time, air, progress, variant)
     shown = scene.time.shown if time is None else time
     picture = studio.shoot(airs, time=shown, progress=progress)
     if truth:
@@ -275,15 +275,15 @@ def render(
 
 
 def _airs(
-    scene: Scene, time: float | None, air: AirSource, progress: ProgressMeter
+    scene: Scene, time: float | None, air: AirSource, progress: ProgressMeter, variant: Variant
 ) -> AirVolume | tuple[AirVolume, ...] | None:
     """The air that one picture is seen through, at each instant of its exposure if it moves."""
     if scene.tracer.method == "straight":
         return None
     if scene.camera.shutter == 0 or isinstance(air, AirVolume):
-        return air_at(scene, time, air, progress)
+        return air_at(scene, time, air, progress, variant)
     instants = scene.camera.instants(scene.time.shown if time is None else time)
-    return tuple(air_instants(scene, instants, air, progress))
+    return tuple(air_instants(scene, instants, air, progress, variant=variant))
 
 
 def warn_of_errors(report: ErrorReport, scene: Scene) -> None:

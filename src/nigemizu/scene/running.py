@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
+import math
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -22,6 +23,7 @@ from nigemizu.scene.turbulent import AddedTurbulence
 if TYPE_CHECKING:
     import xarray
 
+    from nigemizu.field import Types
     from nigemizu.heat import Checkpoints, State
     from nigemizu.scene.model import Scene
 
@@ -31,6 +33,7 @@ __all__ = [
     "Variant",
     "air_at",
     "air_instants",
+    "flow_arrays",
     "open_air",
     "require_within",
     "save_air",
@@ -44,6 +47,8 @@ FloatArray: TypeAlias = NDArray[np.float64]
 _PHYSICS: Final = {
     "grid", "initial", "ground", "sides", "top", "diffusivity", "wind", "convection", "sources",
 }  # fmt: skip
+
+_WORTH_A_CARD: Final = 100_000  # cells; a step of fewer is made of kernels that take longer to start than to run
 
 
 class AirVolume(NamedTuple):
@@ -66,21 +71,25 @@ class AirVolume(NamedTuple):
     temperature: FloatArray | None = None
 
 
-def simulate(scene: Scene, times: tuple[float, ...], progress: ProgressMeter) -> xarray.Dataset:
+def simulate(
+    scene: Scene, times: tuple[float, ...], progress: ProgressMeter, variant: Variant = "auto"
+) -> xarray.Dataset:
     """See `nigemizu.scene.Scene.simulate`."""
     from nigemizu.heat import complete, to_dataset
 
     scene.check()
     _require_times(times, scene)
     _require_memory(scene, len(times))
-    states = _states(scene, times, progress)
+    states = _states(scene, times, progress, variant=variant)
     dataset = to_dataset(
         scene.require_heated().grid.build(), states, title=scene.title, scene=scene.to_toml()
     )
     return complete(dataset, scene.air)
 
 
-def save_air(scene: Scene, path: Path, command: str, progress: ProgressMeter) -> Path:
+def save_air(
+    scene: Scene, path: Path, command: str, progress: ProgressMeter, variant: Variant = "auto"
+) -> Path:
     """See `nigemizu.scene.Scene.save_air`."""
     from nigemizu.heat import complete, to_dataset
     from nigemizu.output import ready_to_write, write_air
@@ -90,7 +99,10 @@ def save_air(scene: Scene, path: Path, command: str, progress: ProgressMeter) ->
     grid = scene.require_heated().grid.build()
     about = {"title": scene.title, "scene": scene.to_toml(), "history": command}
     kept = checkpoints(scene, scene.time.stored, path.with_name(f"{path.name}.checkpoints"))
-    states = _states(scene, scene.time.stored, progress) if kept is None else _kept(scene, kept, progress)
+    if kept is None:
+        states = _states(scene, scene.time.stored, progress, variant=variant)
+    else:
+        states = _kept(scene, kept, progress, variant)
     instants = (complete(to_dataset(grid, [state], **about), scene.air) for state in states)
     written = write_air(air=instants, path=path)
     if kept is not None:
@@ -98,12 +110,14 @@ def save_air(scene: Scene, path: Path, command: str, progress: ProgressMeter) ->
     return written
 
 
-def air_at(scene: Scene, time: float | None, air: AirSource, progress: ProgressMeter) -> AirVolume:
+def air_at(
+    scene: Scene, time: float | None, air: AirSource, progress: ProgressMeter, variant: Variant = "auto"
+) -> AirVolume:
     """See `nigemizu.scene.Scene.air_at`."""
     if isinstance(air, AirVolume):
         return air
     shown = scene.time.shown if time is None else time
-    return next(iter(air_instants(scene, (shown,), air, progress)))
+    return next(iter(air_instants(scene, (shown,), air, progress, variant=variant)))
 
 
 def air_instants(
@@ -114,6 +128,7 @@ def air_instants(
     *,
     first: int = 0,
     folder: Path | None = None,
+    variant: Variant = "auto",
 ) -> Iterator[AirVolume]:
     """The air at each of the instants from number `first` on, one after another; only one is held.
 
@@ -138,7 +153,7 @@ def air_instants(
     else:
         grid = scene.require_heated().grid.build()
         kept = None if folder is None else checkpoints(scene, times, folder)
-        states = _states(scene, times, progress, first, kept)
+        states = _states(scene, times, progress, first, kept, variant)
         near = (_volume(scene, to_dataset(grid, [state]), state.time, turbulence) for state in states)
     yield from near if far is None else (far.around(volume) for volume in near)
 
@@ -169,14 +184,15 @@ def checkpoints(scene: Scene, times: tuple[float, ...], folder: Path) -> Checkpo
     return Checkpoints(folder, identity, scene.convection.checkpoint_every or max(times) / 20)
 
 
-def _kept(scene: Scene, kept: Checkpoints, progress: ProgressMeter) -> Iterator[State]:
+def _kept(scene: Scene, kept: Checkpoints, progress: ProgressMeter, variant: Variant) -> Iterator[State]:
     """All stored instants: those of an interrupted run first, then those of the flow that goes on."""
     first, times = 0, scene.time.stored
     for state in kept.instants():
         yield state
         first += 1
     if first < len(times):
-        for number, state in enumerate(_states(scene, times, progress, first, kept), start=first):
+        states = _states(scene, times, progress, first, kept, variant)
+        for number, state in enumerate(states, start=first):
             kept.keep(number, state)
             yield state
 
@@ -187,6 +203,7 @@ def _states(
     progress: ProgressMeter,
     first: int = 0,
     kept: Checkpoints | None = None,
+    variant: Variant = "auto",
 ) -> Iterable[State]:
     from nigemizu.heat import convect, evolve
 
@@ -205,8 +222,30 @@ def _states(
     }
     if scene.process == "convection":
         common |= {"convection": scene.convection, "sources": scene.sources}
+        common["arrays"] = flow_arrays(variant, math.prod(grid.shape))
         return convect(grid, temperature, checkpoints=kept, first=first, **common)
     return itertools.islice(evolve(grid, temperature, **common), first, None)
+
+
+def flow_arrays(variant: Variant, cells: int) -> Types | None:
+    """Array types of the graphics card on which air moves by itself; None: on the processor.
+
+    ``auto`` takes a card that is at hand for meshes that keep it busy.
+
+    Raises
+    ------
+    MachineError
+        When ``cuda`` is asked for and there is no such card.
+    """
+    if variant == "llvm" or (variant == "auto" and cells < _WORTH_A_CARD):
+        return None
+    import drjit
+
+    from nigemizu.field import types
+
+    if variant == "auto" and not drjit.has_backend(drjit.JitBackend.CUDA):
+        return None
+    return types("cuda", "double")
 
 
 def _require_times(times: tuple[float, ...], scene: Scene) -> None:

@@ -54,9 +54,8 @@ class Checkpoints:
     def write(self, air: MovingAir) -> None:
         """Keep the state of the air, and drop the oldest."""
         u, v, w = air.velocity
-        warmth = air.warmth[2:-2, 2:-2, 2:-2]
         numbers = {"time": air.time, "zero": air.zero, "top_warmth": air.top_warmth}
-        self._save(f"state_{air.time:017.9f}.npz", u=u, v=v, w=w, warmth=warmth, **numbers)
+        self._save(f"state_{air.time:017.9f}.npz", u=u, v=v, w=w, warmth=air.warmth, **numbers)
         for old in self._states()[:-_KEPT]:
             old.unlink(missing_ok=True)
         self._passed(air.time)

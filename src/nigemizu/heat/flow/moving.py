@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, final
 
 import numpy as np
 
 from nigemizu.heat.boundary import GroundBoundary, Sides, Top
-from nigemizu.heat.flow import kernels, momentum, softening
+from nigemizu.heat.flow.cells import INSIDE, Cells, Fluxes, Frame, Velocity
 from nigemizu.heat.flow.ground import GroundLayer
-from nigemizu.heat.flow.padding import PAD, pad_ends, pad_sides, padded
-from nigemizu.heat.flow.pressure import Poisson
+from nigemizu.heat.flow.loops import Loops
+from nigemizu.heat.flow.padding import PAD, Padding
 from nigemizu.heat.flow.settings import Convection
 from nigemizu.heat.flow.sources import Release, Source
 from nigemizu.heat.grid import Grid
-from nigemizu.heat.stepping import processors, top_temperature
+from nigemizu.heat.stepping import top_temperature
 
 __all__ = ["MovingAir"]
 
@@ -28,9 +26,6 @@ _C: Final = (0.0, 1 / 3, 3 / 4)
 """Williamson's Runge–Kutta scheme of third order: G ← A G + Δt N, q ← q + B G at t + C Δt."""
 _SPREADING: Final = 2.0  # of 2.51, where the scheme stops being stable on the negative real axis
 _LIFTING: Final = 1.0  # radians that internal waves or growing plumes may turn or grow in a step
-
-Velocity = tuple[np.ndarray, np.ndarray, np.ndarray]
-INSIDE: Final = (slice(PAD, -PAD),) * 3
 
 
 @final
@@ -49,13 +44,18 @@ class MovingAir:
         Temperatures [K] of the two walls along "x" or "y", which are insulated otherwise.
     sources : sequence of Source
         What is heated or pushed inside.
+    arrays : nigemizu.field.Types, optional
+        Double-precision array types of a device, which does the work instead of the processor's loops.
 
     Attributes
     ----------
-    u, v, w : (nz + 4, ny + 4, nx + 4) float64, m s-1
-        On the left, right (low y) and lower faces, with two cells of padding.
-    warmth : (nz + 4, ny + 4, nx + 4) float64, K
-        Potential temperature θ = T + Γ z at the centres.
+    cells : Cells
+        The fields, and the device that they are on.
+    time : float, s
+    zero : float, K
+        The warmth that is neither lighter nor heavier: the mean at the beginning.
+    top_warmth : float, K
+        Of the top, if that is held.
 
     Notes
     -----
@@ -63,11 +63,12 @@ class MovingAir:
               \partial_i u_j)] + g \frac{\theta - \theta_0}{\theta_0} \delta_{i3}, \quad \partial_i u_i = 0
     .. math:: \partial_t \theta + \partial_j (u_j \theta) = \partial_j (\kappa \partial_j \theta)
 
-    with molecular and eddy viscosity ν and diffusivity κ. Finite volumes on a staggered mesh; the momentum by
-    averages that conserve its energy, the temperature by limited third-order upwind values (or averages).
-    Three stages of Williamson's Runge–Kutta scheme, each made free of divergence to round-off
-    (`nigemizu.heat.flow.pressure`): third order in the step, second in the cells. With eddies, what they
-    diffuse upwards and downwards is taken implicitly (`nigemizu.heat.flow.softening`).
+    with the potential temperature θ = T + Γ z (here called warmth), molecular and eddy viscosity ν and
+    diffusivity κ. Finite volumes on a staggered mesh; the momentum by averages that conserve its energy, the
+    temperature by limited third-order upwind values (or averages). Three stages of Williamson's Runge–Kutta
+    scheme, each made free of divergence to round-off (`nigemizu.heat.flow.pressure`): third order in the
+    step, second in the cells. With eddies, what they diffuse upwards and downwards is taken implicitly
+    (`nigemizu.heat.flow.softening`).
 
     Limits: the density varies with the temperature only, by little, and in its weight alone (Boussinesq): for
     differences of some ten kelvin, and layers that are thin against 8 km. No moisture, no Coriolis force.
@@ -86,117 +87,102 @@ class MovingAir:
         sides: Sides,
         top: Top,
         diffusivity: float,
-        held_sides: dict[str, tuple[float, float]] | None = None,
+        held_sides: Mapping[str, tuple[float, float]] | None = None,
         sources: Sequence[Source] = (),
+        arrays: Any = None,
     ) -> None:
         self.grid, self.flow, self.diffusivity = grid, flow, diffusivity
-        self.workers = processors()
-        self._pool: ThreadPoolExecutor | None = None
         self.walls = (sides.x == "insulated", sides.y == "insulated")
-        self._held = held_sides or {}
-        self.u, self.v, self.w, self.warmth = (padded(grid.shape) for _ in range(4))
-        self._increments = [np.zeros(grid.shape) for _ in range(4)]
-        self._nu = np.full(self.u.shape, flow.viscosity)
-        self._poisson = Poisson(grid, self.walls, self._share, self.workers)
         self._layer = GroundLayer(grid, ground, flow, diffusivity)
+        slips = (flow.sides == "free-slip", self._layer.rough, flow.top == "free-slip")
+        padding = Padding(self.walls, slips, held_sides or {})
+        holds = self._layer.holds and not self._layer.rough
+        self.cells = _cells(Frame(grid, flow, padding, self.walls, diffusivity, holds), arrays)
         self._release = Release(grid, sources, self.walls)
         self._top = top
         self.top_warmth = math.nan
         self.zero = math.nan
         self.time = 0.0
-        # ---- metric
-        self._rdx, self._rdy = (1 / grid.horizontal_step(axis) for axis in "xy")
-        z = np.pad(grid.z_widths, PAD, mode="symmetric" if len(grid.z) > 1 else "edge")
-        self._dz, self._rdz = z, 1 / z
-        between = np.empty_like(z)
-        between[1:] = 0.5 * (z[1:] + z[:-1])
-        between[0] = between[1]
-        self._rdzf = np.append(1 / between, 1 / between[-1])
 
     def __enter__(self) -> MovingAir:
-        self._pool = ThreadPoolExecutor(self.workers)
+        self.cells.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
-        assert self._pool is not None
-        self._pool.shutdown()
+        self.cells.__exit__()
 
     # ------------------------------------------------------------------ state
     def set(self, temperature: Any, velocity: Velocity | None = None, time: float = 0.0) -> None:
         """Begin with a temperature (nz, ny, nx) [K] and velocities on the faces, each (nz, ny, nx) [m/s]."""
+        warmth = temperature + (self.flow.lapse_rate * self.grid.z)[:, None, None]
+        still = np.zeros(self.grid.shape)
         self.time = time
-        self.warmth[INSIDE] = temperature + (self.flow.lapse_rate * self.grid.z)[:, None, None]
-        self._set_zero(float(np.mean(self.warmth[INSIDE])))
-        for field, given in zip((self.u, self.v, self.w), () if velocity is None else velocity, strict=False):
-            field[INSIDE] = given
+        self._set_zero(float(np.mean(warmth)))
         if math.isnan(self.top_warmth):
-            self.top_warmth = self._mean_top()
-        self._fill()
-        self._project()
+            self.top_warmth = self._mean_top(warmth)
+        self.cells.put((still, still, still) if velocity is None else velocity, warmth)
+        self.cells.project()
 
     def restore(
         self, warmth: Any, velocity: Velocity, *, time: float, zero: float, top_warmth: float
     ) -> None:
         """Go on from a state that was reached before: the next steps are the same to the bit."""
-        self.warmth[INSIDE] = warmth
-        for field, given in zip((self.u, self.v, self.w), velocity, strict=True):
-            field[INSIDE] = given
+        self.cells.put(velocity, warmth)
         self.time, self.top_warmth = time, top_warmth
         self._set_zero(zero)
-        self._fill()
 
     def _set_zero(self, warmth: float) -> None:
         self.zero = warmth
         self._release.set_air(warmth, self.flow.gravity / warmth)
 
     @property
+    def warmth(self) -> np.ndarray:
+        """Potential temperature θ = T + Γ z [K] at the centres, (nz, ny, nx)."""
+        return np.asarray(self.cells.fields[3][INSIDE])
+
+    @property
     def temperature(self) -> np.ndarray:
         """T [K] at the centres, (nz, ny, nx)."""
         lapse = self.flow.lapse_rate * self.grid.z
-        return np.asarray(self.warmth[INSIDE] - lapse[:, None, None])
+        return np.asarray(self.warmth - lapse[:, None, None])
 
     @property
     def velocity(self) -> Velocity:
         """Velocities on the faces, without padding: what `set` takes."""
-        u, v, w = (field[INSIDE].copy() for field in (self.u, self.v, self.w))
+        u, v, w = (field[INSIDE].copy() for field in self.cells.fields[:3])
         return u, v, w
 
     def skin_at(self, time: float) -> np.ndarray:
         """Temperature [K] of the air's skin on the ground, (ny, nx)."""
-        return np.asarray(self._through_ground(time)[2])
+        return self._through_ground(time)[1]
 
     @property
     def wind(self) -> Velocity:
         """Velocities at the centres [m s-1], each (nz, ny, nx)."""
-        middle = slice(PAD, -PAD)
-        after = slice(PAD + 1, 1 - PAD)
+        middle, after = slice(PAD, -PAD), slice(PAD + 1, 1 - PAD)
+        u, v, w, _ = self.cells.fields
         return (
-            0.5 * (self.u[INSIDE] + self.u[middle, middle, after]),
-            0.5 * (self.v[INSIDE] + self.v[middle, after, middle]),
-            0.5 * (self.w[INSIDE] + self.w[after, middle, middle]),
+            0.5 * (u[INSIDE] + u[middle, middle, after]),
+            0.5 * (v[INSIDE] + v[middle, after, middle]),
+            0.5 * (w[INSIDE] + w[after, middle, middle]),
         )
 
     def divergence(self) -> np.ndarray:
         """Of the velocity [1/s] at the centres."""
-        result = np.empty(self.grid.shape)
-        self._levels(kernels.divergence, self.u, self.v, self.w, result, self._rdx, self._rdy, self._rdz)
-        return result
+        return self.cells.divergence()
 
     # ------------------------------------------------------------------ steps
     def longest_step(self) -> float:
         """The step [s] that the scheme bears now; infinite in air at rest that nothing moves."""
-        self._update_viscosity()
         flow = self.flow
         lift = flow.gravity / self.zero
         # eddies conduct heat by 1/Pr_t of the viscosity, molecules by what they do
         prandtl = 1 / flow.turbulent_prandtl if flow.closure == "vreman" else 1.0
         largest = max(1.0, prandtl, self.diffusivity / max(flow.viscosity, 1e-300))
-        args = (self.u, self.v, self.w, self._nu, self.warmth, lift, largest, flow.closure == "none")
-        metric = (self._rdx, self._rdy, self._rdz, self._rdzf)
-        found = self._levels(kernels.fastest, *args, *metric)
-        crossing, spreading, lifting = np.max(np.array(found), axis=0)
+        crossing, spreading, lifting = self.cells.rates(lift, largest, flow.closure == "none")
         if flow.viscosity == 0:
-            room = 4 * (self._rdx**2 + self._rdy**2 + np.max(self._rdz) ** 2)
+            metric = self.cells.metric
+            room = 4 * (metric.rdx**2 + metric.rdy**2 + float(np.max(metric.rdz)) ** 2)
             spreading = max(spreading, self.diffusivity * room)
         now = self._bearable(crossing, spreading, lifting, self.time)
         then = self._bearable(crossing, spreading, lifting, self.time + now)
@@ -222,158 +208,56 @@ class MovingAir:
         A uniform force, as that of a pressure that falls along the wind, keeps it up against the drag of the
         ground.
         """
-        begin = self.time
+        begin, cells = self.time, self.cells
         for a, b, c in zip(_A, _B, _C, strict=True):
-            self._push(a, step, begin + c * step)
-            self._release.add(self._increments, begin, step)
-            if self.flow.closure == "none":
-                self._add(b)
-            else:
-                self._add_softly(b, b * step)
-            self._fill()
-            self._project()
-        for field, mean in zip((self.u, self.v), mean_wind, strict=True):
+            low, _ = self._through_ground(begin + c * step)
+            cells.push(a, step, low, self._through_top(), self.flow.gravity / self.zero, self.zero)
+            cells.release(self._release.during(begin, step))
+            cells.add(b, b * step)
+            cells.project()
+        for axis, mean in enumerate(mean_wind):
             if mean is not None:
-                field[INSIDE] += mean - self._mean(field)
-        if mean_wind != (None, None):
-            self._fill()
+                cells.keep_mean(axis, mean)
         self.time = begin + step
 
-    def _add(self, b: float) -> None:
-        skip_x, skip_y = (int(wall) for wall in self.walls)
-        skips = ((skip_x, 0, 0), (0, skip_y, 0), (0, 0, 1), (0, 0, 0))
-        fields = (self.u, self.v, self.w, self.warmth)
-        for field, increment, skip in zip(fields, self._increments, skips, strict=True):
-            self._levels(kernels.add, field, increment, b, *skip)
-
-    def _add_softly(self, b: float, time: float) -> None:
-        """The same with increments that vertical diffusion has softened."""
-        gu, gv, gw, gs = self._increments
-        flow, nu, metric = self.flow, self._nu, (self._rdz, self._rdzf)
-        skip_x, skip_y = (int(wall) for wall in self.walls)
-        drag = 0.0 if self._layer.rough else 2 * flow.viscosity * self._rdz[PAD]
-        held = 0.0 if self._layer.rough or not self._layer.holds else 2 * self.diffusivity * self._rdz[PAD]
-        momentum_ = (nu, flow.viscosity, 1.0, flow.viscosity, drag)
-        heat = (nu, flow.viscosity, 1 / flow.turbulent_prandtl, self.diffusivity, held)
-        self._rows(softening.add_softly, self.u, gu, b, time, *momentum_, skip_x, 0, *metric)
-        self._rows(softening.add_softly, self.v, gv, b, time, *momentum_, 0, skip_y, *metric)
-        self._rows(softening.add_softly_on_faces, self.w, gw, b, time, nu, *metric)
-        self._rows(softening.add_softly, self.warmth, gs, b, time, *heat, 0, 0, *metric)
-
-    def _mean(self, field: np.ndarray) -> float:
-        levels = field[INSIDE].mean(axis=(1, 2))
-        return float(levels @ self.grid.z_widths / np.sum(self.grid.z_widths))
-
-    def _push(self, a: float, dt: float, time: float) -> None:
-        """Increments of one stage."""
-        u, v, w, s, nu = self.u, self.v, self.w, self.warmth, self._nu
-        flow = self.flow
-        gu, gv, gw, gs = self._increments
-        (low_u, low_v), low_s, _ = self._through_ground(time)
-        (high_u, high_v), high_s = self._through_top()
-        metric = (self._rdx, self._rdy, self._rdz, self._rdzf)
-        self._levels(momentum.push_u, u, v, w, nu, low_u, high_u, gu, a, dt, *metric)
-        if self.grid.shape[1] > 1 or self.walls[1] or np.any(v):
-            self._levels(momentum.push_v, u, v, w, nu, low_v, high_v, gv, a, dt, *metric)
-        vertical = (self._rdx, self._rdy, self._dz, self._rdzf)
-        lift = flow.gravity / self.zero
-        self._levels(momentum.push_w, u, v, w, nu, s, lift, self.zero, gw, a, dt, *vertical)
-        eddies = 1 / flow.turbulent_prandtl if flow.closure == "vreman" else 0.0
-        limited = flow.advection == "limited"
-        heat = (self.diffusivity, flow.viscosity, eddies, limited)
-        self._levels(kernels.push_warmth, u, v, w, s, nu, low_s, high_s, gs, a, dt, *heat, *metric)
-
-    def _through_ground(self, time: float) -> tuple[tuple[Any, Any], Any, Any]:
-        """Fluxes of momentum along x and y, and of heat, through the ground, and the air's skin on it."""
-        u, v = self.u[PAD], self.v[PAD]
+    def _through_ground(self, time: float) -> tuple[Fluxes, np.ndarray]:
+        """What passes through the ground, and the temperature [K] of the air's skin on it."""
+        u, v, warmth = self.cells.level(0)
         here = (slice(PAD, -PAD),) * 2
         u_at_v, v_at_u = 0.25 * _around(u, (-1, 0), (0, 1)), 0.25 * _around(v, (0, 1), (-1, 0))
         stresses = self._layer.stresses((u[here], u_at_v), (v[here], v_at_u))
         speed = np.hypot(
             0.5 * (u[here] + u[PAD:-PAD, PAD + 1 : 1 - PAD]), 0.5 * (v[here] + v[PAD + 1 : 1 - PAD, PAD:-PAD])
         )
-        return stresses, *self._layer.heat(self.warmth[PAD][here], speed, time, self.zero)
+        heat, skin = self._layer.heat(warmth[here], speed, time, self.zero)
+        return Fluxes(*stresses, heat), np.asarray(skin)
 
-    def _through_top(self) -> tuple[tuple[Any, Any], Any]:
-        highest = self.grid.shape[0] + PAD - 1
-        inside = (highest, slice(PAD, -PAD), slice(PAD, -PAD))
-        half = 0.5 * float(self.grid.z_widths[-1])
+    def _through_top(self) -> Fluxes:
         still = np.zeros(self.grid.shape[1:])
-        stresses = (still, still)
-        if self.flow.top == "no-slip":
-            factor = self.flow.viscosity / half
-            stresses = (factor * self.u[inside], factor * self.v[inside])
-        if self._top.kind == "insulated":
-            return stresses, still
-        return stresses, self.diffusivity / half * (self.warmth[inside] - self.top_warmth)
+        sticks, held = self.flow.top == "no-slip", self._top.kind != "insulated"
+        if not sticks and not held:
+            return Fluxes(still, still, still)
+        inside = (slice(PAD, -PAD),) * 2
+        half = 0.5 * float(self.grid.z_widths[-1])
+        u, v, warmth = (plane[inside] for plane in self.cells.level(-1))
+        factor = self.flow.viscosity / half
+        heat = self.diffusivity / half * (warmth - self.top_warmth) if held else still
+        return Fluxes(factor * u, factor * v, heat) if sticks else Fluxes(still, still, heat)
 
-    def _mean_top(self) -> float:
+    def _mean_top(self, warmth: np.ndarray) -> float:
         """θ at the top: given, or the mean in the beginning, on the line through the two highest levels."""
         edge = float(self.grid.z_edges[-1])
         if self._top.temperature is not None:
             return self._top.temperature + self.flow.lapse_rate * edge
-        return top_temperature(self.grid, self.warmth[INSIDE])
+        return top_temperature(self.grid, warmth)
 
-    def _fill(self) -> None:
-        """The padding of all fields."""
-        slip = 1.0 if self.flow.sides == "free-slip" else -1.0
-        below, above = -1.0, 1.0 if self.flow.top == "free-slip" else -1.0
-        if self._layer.rough:
-            below = 1.0
-        for axis, wall, name, normal in ((2, self.walls[0], "x", self.u), (1, self.walls[1], "y", self.v)):
-            for field in (self.u, self.v, self.w):
-                kind = "periodic" if not wall else "face" if field is normal else "centre"
-                pad_sides(field, axis, kind, -1.0 if field is normal else slip)
-            held = self._held.get(name)
-            pad_sides(
-                self.warmth, axis, "centre" if wall else "periodic", 1.0 if held is None else -1.0, held
-            )
-        pad_ends(self.u, below, above)
-        pad_ends(self.v, below, above)
-        pad_ends(self.warmth, 1.0, 1.0)
-        top = self.grid.shape[0] + PAD
-        self.w[PAD] = self.w[top] = 0.0
-        for ghost in (1, 2):
-            self.w[PAD - ghost] = -self.w[min(PAD + ghost, top)]
-        self.w[top + 1] = -self.w[top - 1]
 
-    def _update_viscosity(self) -> None:
-        if self.flow.closure == "none":
-            return
-        args = (self.u, self.v, self.w, self._nu, self.flow.viscosity, self.flow.closure_constant)
-        self._levels(kernels.eddy_viscosity, *args, self._rdx, self._rdy, self._dz, self._rdz)
-        for axis, wall in ((2, self.walls[0]), (1, self.walls[1])):
-            pad_sides(self._nu, axis, "centre" if wall else "periodic", 1.0)
-        pad_ends(self._nu, 1.0, 1.0)
+def _cells(frame: Frame, arrays: Any) -> Cells:
+    if arrays is None:
+        return Loops(frame)
+    from nigemizu.heat.flow.device import DeviceCells
 
-    def _project(self) -> None:
-        phi = self._poisson.solve(self.divergence())
-        wall_x, wall_y = self.walls
-        self._levels(
-            kernels.correct, self.u, self.v, self.w, phi, wall_x, wall_y, self._rdx, self._rdy, self._rdzf
-        )
-        self._fill()
-
-    # ------------------------------------------------------------------ sharing of the work
-    def _levels(self, kernel: Callable[..., Any], *args: Any) -> list[Any]:
-        """Run a compiled loop over all levels, parts of them side by side."""
-        results: list[Any] = []
-        self._share(lambda first, last: results.append(kernel(first, last, *args)), self.grid.shape[0])
-        return results
-
-    def _rows(self, kernel: Callable[..., Any], *args: Any) -> None:
-        """The same over all rows along x."""
-        self._share(lambda first, last: kernel(first, last, *args), self.grid.shape[1])
-
-    def _share(self, work: Callable[[int, int], None], count: int) -> None:
-        parts = min(self.workers, count)
-        bounds = np.linspace(0, count, parts + 1).astype(int)
-        if self._pool is None or parts == 1:
-            work(0, count)
-            return
-        tasks = [self._pool.submit(work, int(a), int(b)) for a, b in itertools.pairwise(bounds)]
-        for task in tasks:
-            task.result()
+    return DeviceCells(frame, arrays)
 
 
 def _around(plane: np.ndarray, rows: tuple[int, int], columns: tuple[int, int]) -> Any:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from collections.abc import Mapping
+from typing import Any, Final, final
 
 import numpy as np
 
-__all__ = ["PAD", "pad_ends", "pad_sides", "padded"]
+__all__ = ["PAD", "Padding", "pad_ends", "pad_sides", "padded"]
 
 PAD: Final = 2
 
@@ -62,3 +63,50 @@ def pad_ends(values: Any, sign_below: float, sign_above: float) -> None:
         within = min(ghost, count - 1)
         values[PAD - 1 - ghost] = sign_below * values[PAD + within]
         values[PAD + count + ghost] = sign_above * values[PAD + count - 1 - within]
+
+
+@final
+class Padding:
+    """What lies beyond sides, ground and top of a flow.
+
+    Parameters
+    ----------
+    walls : (bool, bool)
+        Whether the sides along x and y are walls; else periodic.
+    slips : (bool, bool, bool)
+        Whether the air slips along such walls, along the ground, and along the top.
+    held : mapping
+        Temperatures [K] of the two walls along "x" or "y", which are insulated otherwise.
+    """
+
+    def __init__(
+        self,
+        walls: tuple[bool, bool],
+        slips: tuple[bool, bool, bool],
+        held: Mapping[str, tuple[float, float]],
+    ) -> None:
+        self._walls, self._held = walls, held
+        self._sides, self._below, self._above = (1.0 if slip else -1.0 for slip in slips)
+
+    def fill(self, u: Any, v: Any, w: Any, warmth: Any) -> None:
+        """The padding of all fields; velocities through walls, ground and top become 0."""
+        for axis, wall, name, normal in ((2, self._walls[0], "x", u), (1, self._walls[1], "y", v)):
+            for field in (u, v, w):
+                kind = "periodic" if not wall else "face" if field is normal else "centre"
+                pad_sides(field, axis, kind, -1.0 if field is normal else self._sides)
+            held = self._held.get(name)
+            pad_sides(warmth, axis, "centre" if wall else "periodic", 1.0 if held is None else -1.0, held)
+        pad_ends(u, self._below, self._above)
+        pad_ends(v, self._below, self._above)
+        pad_ends(warmth, 1.0, 1.0)
+        top = len(w) - PAD
+        w[PAD] = w[top] = 0.0
+        for ghost in (1, 2):
+            w[PAD - ghost] = -w[min(PAD + ghost, top)]
+        w[top + 1] = -w[top - 1]
+
+    def fill_viscosity(self, nu: Any) -> None:
+        """That of the viscosity."""
+        for axis, wall in ((2, self._walls[0]), (1, self._walls[1])):
+            pad_sides(nu, axis, "centre" if wall else "periodic", 1.0)
+        pad_ends(nu, 1.0, 1.0)

@@ -11,7 +11,37 @@ import scipy.fft
 from nigemizu.heat.flow.kernels import solve_columns
 from nigemizu.heat.grid import Grid
 
-__all__ = ["Poisson"]
+__all__ = ["Poisson", "pivots"]
+
+
+def pivots(grid: Grid, eigenvalues: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Thomas's elimination of ∂²/∂z² − λ, ahead of all right-hand sides.
+
+    Parameters
+    ----------
+    grid : Grid
+    eigenvalues : (rows, columns) float64, m-2
+        λ of each pair of waves along x and y; the first pair does not vary.
+
+    Returns
+    -------
+    lower, upper : (nz,) float64, m-2
+        Coefficients of the neighbours below and above.
+    inverse : (nz, rows, columns) float64, m2
+        One over the pivots.
+    """
+    z, centres = grid.z_widths, np.diff(grid.z)
+    lower, upper = np.zeros_like(z), np.zeros_like(z)
+    lower[1:], upper[:-1] = 1 / (centres * z[1:]), 1 / (centres * z[:-1])
+    inverse = np.empty((len(z), *eigenvalues.shape))
+    previous = np.zeros_like(eigenvalues)
+    for k in range(len(z)):
+        diagonal = -(lower[k] + upper[k]) - eigenvalues - lower[k] * previous
+        if k == len(z) - 1:
+            diagonal[0, 0] = -1.0  # the mean is free: any finite number does
+        inverse[k] = 1 / diagonal
+        previous = upper[k] * inverse[k]
+    return lower, upper, inverse
 
 
 @final
@@ -56,18 +86,7 @@ class Poisson:
             self._transforms.append((kind, axis))
         eigenvalues = [self._eigenvalues(grid, axis) for axis in (1, 2)]
         total = np.add.outer(*eigenvalues)
-        z, centres = grid.z_widths, np.diff(grid.z)
-        lower, upper = np.zeros_like(z), np.zeros_like(z)
-        lower[1:], upper[:-1] = 1 / (centres * z[1:]), 1 / (centres * z[:-1])
-        self._lower, self._upper = lower, upper
-        self._inverse = np.empty((len(z), *total.shape))
-        previous = np.zeros_like(total)
-        for k in range(len(z)):
-            diagonal = -(lower[k] + upper[k]) - total - lower[k] * previous
-            if k == len(z) - 1:
-                diagonal[0, 0] = -1.0  # the mean is free: any finite number does
-            self._inverse[k] = 1 / diagonal
-            previous = upper[k] * self._inverse[k]
+        self._lower, self._upper, self._inverse = pivots(grid, total)
 
     def _eigenvalues(self, grid: Grid, axis: int) -> np.ndarray:
         count = grid.shape[axis]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final, final
+from typing import Any, Final, final
 
 import numpy as np
 
@@ -48,6 +48,7 @@ def convect(
     time_step: float | None = None,
     checkpoints: Checkpoints | None = None,
     first: int = 0,
+    arrays: Any = None,
     progress: ProgressMeter = SILENT,
     available: Callable[[], int | None] = available_memory,
 ) -> Iterator[State]:
@@ -76,6 +77,8 @@ def convect(
         Where the flow is kept from time to time, and taken up from.
     first : int
         Number of the first of the times that is given out; those before it are passed.
+    arrays : nigemizu.field.Types, optional
+        Double-precision array types of a device that moves the air; by default the processor does.
     progress : ProgressMeter
         Told of the simulated time.
     available : callable
@@ -106,7 +109,9 @@ def convect(
     instants = check_times(times, 0.0)
     require_memory(math.prod(grid.shape), available=available, volumes=VOLUMES)
     initial = check_temperature(grid, temperature)
-    air = MovingAir(grid, convection, ground, sides, top, diffusivity.molecular, sources=sources)
+    air = MovingAir(
+        grid, convection, ground, sides, top, diffusivity.molecular, sources=sources, arrays=arrays
+    )
     mean_wind = _mean_wind(grid, wind, air.walls)
     with air:
         if checkpoints is None or not checkpoints.take_up(air, instants[first]):
@@ -170,8 +175,9 @@ def _steps_to(run: _Run, instant: float) -> Iterator[None]:
 
 
 def _is_sound(air: MovingAir) -> bool:
-    fastest = max(float(np.max(np.abs(field))) for field in (air.u, air.v, air.w))
-    return fastest < _FASTEST and bool(np.isfinite(np.max(np.abs(air.warmth))))
+    *velocity, warmth = air.cells.fields
+    fastest = max(float(np.max(np.abs(field))) for field in velocity)
+    return fastest < _FASTEST and bool(np.isfinite(np.max(np.abs(warmth))))
 
 
 def _diverged(run: _Run) -> DivergedError:

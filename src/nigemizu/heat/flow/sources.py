@@ -15,7 +15,7 @@ from nigemizu.heat.grid import Grid
 from nigemizu.heat.measures import Degrees, Metres, Newtons, Seconds, Watts
 from nigemizu.values import Value
 
-__all__ = ["SPECIFIC_HEAT", "Release", "Source", "air_density", "require_inside"]
+__all__ = ["SPECIFIC_HEAT", "Part", "Release", "Source", "air_density", "require_inside"]
 
 SPECIFIC_HEAT: Final = 1006.0
 """Of dry air at constant pressure [J kg-1 K-1], as for the ground's heat flux."""
@@ -134,8 +134,8 @@ def _require_room(axis: str, at: float, width: float, faces: np.ndarray, key: st
         )
 
 
-class _Part(NamedTuple):
-    """What one source does to one field: a box of cells and the rate in each."""
+class Part(NamedTuple):
+    """What one source does to one field (u, v, w, warmth: 0 to 3): a box of cells and the rate in each."""
 
     field: int
     place: tuple[slice, slice, slice]
@@ -158,7 +158,7 @@ class Release:
         require_inside(grid, sources)
         self._grid, self._sources = grid, tuple(sources)
         self._weights = [[_weights(grid, source, field, walls) for field in range(4)] for source in sources]
-        self._parts: list[list[_Part]] = []
+        self._parts: list[list[Part]] = []
         self._rates: list[tuple[float, float]] = []
 
     def set_air(self, temperature: float, lift: float) -> None:
@@ -168,21 +168,21 @@ class Release:
         for source, weights in zip(self._sources, self._weights, strict=True):
             strengths = (*(force / rho for force in source.force), source.power / (rho * SPECIFIC_HEAT))
             parts = [
-                _Part(field, place, strength * rate)
+                Part(field, place, strength * rate)
                 for field, (strength, (place, rate)) in enumerate(zip(strengths, weights, strict=True))
                 if strength != 0
             ]
             self._parts.append(parts)
             self._rates.append(self._rates_of(parts, lift))
 
-    def add(self, increments: Sequence[np.ndarray], time: float, step: float) -> None:
-        """Add what is released from `time` on during a step [s], all of it, to the increments of a stage."""
+    def during(self, time: float, step: float) -> list[tuple[Part, float]]:
+        """What is released from `time` on during a step [s], and for how long of it."""
+        released = []
         for source, parts in zip(self._sources, self._parts, strict=True):
             while_on = min(step, time + step - source.start)
-            if while_on <= 0:
-                continue
-            for field, place, rate in parts:
-                increments[field][place] += while_on * rate
+            if while_on > 0:
+                released += [(part, while_on) for part in parts]
+        return released
 
     def rates(self, before: float) -> tuple[float, float]:
         """What sources that start before an instant [s] do to air at rest: the greatest acceleration over the
@@ -198,7 +198,7 @@ class Release:
         """When the next source starts after an instant [s]; infinite if none does."""
         return min((source.start for source in self._sources if source.start >= time), default=math.inf)
 
-    def _rates_of(self, parts: list[_Part], lift: float) -> tuple[float, float]:
+    def _rates_of(self, parts: list[Part], lift: float) -> tuple[float, float]:
         grid, pushing, heating = self._grid, 0.0, 0.0
         for field, place, rate in parts:
             strongest = np.max(np.abs(rate), axis=(1, 2), initial=0.0)

@@ -109,7 +109,7 @@ def transfer_curve(
     if not (math.isfinite(error) and error > 0.0):
         raise InputError("no error of heights", key="tolerance", value=tolerance, expected="metres above 0")
     asked, span = _elevations(scene, distance, elevations)
-    volume = air_at(scene, time, air, progress)
+    volume = air_at(scene, time, air, progress, variant)
     flight = flight_of(scene, volume, distance, azimuth, error, variant)
     radius = scene.earth.radius if scene.earth is not None and scene.round else math.inf
     curve = curve_through(
