@@ -33,7 +33,9 @@ DOUBLE = types("llvm", "double")
 HOT = HeldGround(temperature=Quantity(value=330.0))
 FLUX = FluxGround(heat_flux=Quantity(value=300.0))
 SUN = ExchangeGround(temperature=Quantity(value=330.0), coefficient=Quantity(value=10.0))
-BURNER = Source(position=(1.3, 0.9, 0.5), size=(0.6, 0.7, 0.4), power=5e3, thrust=0.2, elevation=30, start=0.01)
+BURNER = Source(
+    position=(1.3, 0.9, 0.5), size=(0.6, 0.7, 0.4), power=5e3, thrust=0.2, elevation=30, start=0.01
+)
 
 
 def mesh(cells: tuple[int, int, int] = (12, 10, 14)) -> Grid:

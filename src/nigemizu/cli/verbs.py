@@ -105,9 +105,7 @@ def simulate(options: argparse.Namespace) -> int:
     output = ready_to_write(_output(options, ".zarr"), (".zarr", ".nc"))
     _use_threads(options.threads)
     with _naming(options.scene), meter(quiet=options.quiet) as progress:
-        written = scene.save_air(
-            output, variant=options.variant, command=options.command, progress=progress
-        )
+        written = scene.save_air(output, variant=options.variant, command=options.command, progress=progress)
     print(written)
     return 0
 

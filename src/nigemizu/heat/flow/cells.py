@@ -90,7 +90,7 @@ class Cells(ABC):
     Notes
     -----
     A step calls `push`, `release`, `add` and `project` for each of its stages; `nigemizu.heat.flow.moving`
-    decides with what. The padding is always filled.
+    decides with what. Between steps the padding is filled.
     """
 
     def __init__(self, frame: Frame) -> None:
@@ -101,6 +101,7 @@ class Cells(ABC):
 
     def __exit__(self, *_: object) -> None:
         """Give back what the work took beside memory."""
+        return
 
     # ------------------------------------------------------------------ state
     @property
@@ -141,7 +142,7 @@ class Cells(ABC):
 
     @abstractmethod
     def add(self, b: float, time: float) -> None:
-        """q ← q + b G; with eddies, softened by vertical diffusion over a time [s]. Fills the padding."""
+        """q ← q + b G; with eddies, softened by vertical diffusion over a time [s]; `project` comes next."""
 
     @abstractmethod
     def project(self) -> None:

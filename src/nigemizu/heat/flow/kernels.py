@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from nigemizu.heat.flow.momentum import balance, cover
 from nigemizu.heat.kernels import compiled
 
 __all__ = ["add", "correct", "divergence", "eddy_viscosity", "fastest", "push_warmth", "solve_columns"]
@@ -34,6 +35,33 @@ def _flux(s2, s1, s0, sm, speed, conductance, limited):  # type: ignore[no-untyp
 
 
 @compiled(fastmath={"contract"})
+def _heat_along_x(k, j, s, u, nu, kappa, molecular, rprt, limited, rdx, across):  # type: ignore[no-untyped-def]
+    for i in range(2, across.size + 2):
+        c = kappa + (0.5 * (nu[k, j, i - 1] + nu[k, j, i]) - molecular) * rprt
+        across[i - 2] = _flux(
+            s[k, j, i - 2], s[k, j, i - 1], s[k, j, i], s[k, j, i + 1], u[k, j, i], c * rdx, limited
+        )
+
+
+@compiled(fastmath={"contract"})
+def _heat_along_y(k, j, s, v, nu, kappa, molecular, rprt, limited, rdy, rows, row):  # type: ignore[no-untyped-def]
+    for i in range(2, rows.shape[1] + 2):
+        c = kappa + (0.5 * (nu[k, j - 1, i] + nu[k, j, i]) - molecular) * rprt
+        rows[row, i - 2] = _flux(
+            s[k, j - 2, i], s[k, j - 1, i], s[k, j, i], s[k, j + 1, i], v[k, j, i], c * rdy, limited
+        )
+
+
+@compiled(fastmath={"contract"})
+def _heat_along_z(k, j, s, w, nu, kappa, molecular, rprt, limited, rise, plane):  # type: ignore[no-untyped-def]
+    for i in range(2, plane.shape[1] + 2):
+        c = kappa + (0.5 * (nu[k - 1, j, i] + nu[k, j, i]) - molecular) * rprt
+        plane[j - 2, i - 2] = _flux(
+            s[k - 2, j, i], s[k - 1, j, i], s[k, j, i], s[k + 1, j, i], w[k, j, i], c * rise, limited
+        )
+
+
+@compiled(fastmath={"contract"})
 def push_warmth(  # type: ignore[no-untyped-def]
     first, last, u, v, w, s, nu, low, high, g, a, dt, kappa, molecular, rprt, limited, rdx, rdy, rdz, rdzf
 ):
@@ -46,70 +74,35 @@ def push_warmth(  # type: ignore[no-untyped-def]
     """
     ny, nx = low.shape
     top = s.shape[0] - 3
-    east, below, above = np.zeros(nx + 1), np.zeros(nx), np.zeros(nx)
-    south, north = np.zeros(nx), np.zeros(nx)
+    law = (kappa, molecular, rprt, limited)
+    across, rows = np.empty(nx + 1), np.empty((2, nx))
+    below, above = np.empty((ny, nx)), np.empty((ny, nx))
+    for j in range(2, ny + 2):
+        _heat_along_z(first + 2, j, s, w, nu, *law, rdzf[first + 2], below)
     for k in range(first + 2, last + 2):
+        if k == 2:
+            cover(below, low)
+        if k == top:
+            cover(above, high)
+        near = 0
+        _heat_along_y(k, 2, s, v, nu, *law, rdy, rows, near)
         for j in range(2, ny + 2):
-            for i in range(2, nx + 3):
-                c = kappa + (0.5 * (nu[k, j, i - 1] + nu[k, j, i]) - molecular) * rprt
-                east[i - 2] = _flux(
-                    s[k, j, i - 2], s[k, j, i - 1], s[k, j, i], s[k, j, i + 1], u[k, j, i], c * rdx, limited
-                )
-            for i in range(2, nx + 2):
-                c = kappa + (0.5 * (nu[k, j - 1, i] + nu[k, j, i]) - molecular) * rprt
-                south[i - 2] = _flux(
-                    s[k, j - 2, i], s[k, j - 1, i], s[k, j, i], s[k, j + 1, i], v[k, j, i], c * rdy, limited
-                )
-            for i in range(2, nx + 2):
-                c = kappa + (0.5 * (nu[k, j, i] + nu[k, j + 1, i]) - molecular) * rprt
-                north[i - 2] = _flux(
-                    s[k, j - 1, i],
-                    s[k, j, i],
-                    s[k, j + 1, i],
-                    s[k, j + 2, i],
-                    v[k, j + 1, i],
-                    c * rdy,
-                    limited,
-                )
-            for i in range(2, nx + 2):
-                c = kappa + (0.5 * (nu[k - 1, j, i] + nu[k, j, i]) - molecular) * rprt
-                below[i - 2] = _flux(
-                    s[k - 2, j, i],
-                    s[k - 1, j, i],
-                    s[k, j, i],
-                    s[k + 1, j, i],
-                    w[k, j, i],
-                    c * rdzf[k],
-                    limited,
-                )
-            for i in range(2, nx + 2):
-                c = kappa + (0.5 * (nu[k, j, i] + nu[k + 1, j, i]) - molecular) * rprt
-                above[i - 2] = _flux(
-                    s[k - 1, j, i], s[k, j, i], s[k + 1, j, i], s[k + 2, j, i], w[k + 1, j, i],
-                    c * rdzf[k + 1], limited,
-                )  # fmt: skip
-            if k == 2:
-                for i in range(nx):
-                    below[i] = low[j - 2, i]
-            if k == top:
-                for i in range(nx):
-                    above[i] = high[j - 2, i]
-            for i in range(nx):
-                change = (
-                    (east[i + 1] - east[i]) * rdx
-                    + (north[i] - south[i]) * rdy
-                    + (above[i] - below[i]) * rdz[k]
-                )
-                g[k - 2, j - 2, i] = a * g[k - 2, j - 2, i] - dt * change
+            _heat_along_x(k, j, s, u, nu, *law, rdx, across)
+            _heat_along_y(k, j + 1, s, v, nu, *law, rdy, rows, 1 - near)
+            if k < top:
+                _heat_along_z(k + 1, j, s, w, nu, *law, rdzf[k + 1], above)
+            balance(k, j, g, a, dt, across, rows, near, below, above, rdx, rdy, rdz[k])
+            near = 1 - near
+        below, above = above, below
 
 
 @compiled(fastmath={"contract"})
-def add(first, last, target, g, b, skip_x, skip_y, skip_z):  # type: ignore[no-untyped-def]
-    """target += b G, but for faces on walls (`skip_…`: the first face along an axis lies on one)."""
+def add(first, last, target, g, b):  # type: ignore[no-untyped-def]
+    """target += b G, also on walls."""
     _, ny, nx = g.shape
-    for k in range(max(first, skip_z), last):
-        for j in range(skip_y, ny):
-            for i in range(skip_x, nx):
+    for k in range(first, last):
+        for j in range(ny):
+            for i in range(nx):
                 target[k + 2, j + 2, i + 2] += b * g[k, j, i]
 
 
@@ -128,19 +121,21 @@ def divergence(first, last, u, v, w, result, rdx, rdy, rdz):  # type: ignore[no-
 
 
 @compiled(fastmath={"contract"})
-def correct(first, last, u, v, w, phi, wall_x, wall_y, rdx, rdy, rdzf):  # type: ignore[no-untyped-def]
-    """Take the gradient of φ (nz, ny, nx) from the velocity; faces on walls stay as they are."""
+def correct(first, last, u, v, w, phi, rdx, rdy, rdzf):  # type: ignore[no-untyped-def]
+    """Take the gradient of φ (nz, ny, nx), which is periodic, from the velocity; also on walls."""
     _, ny, nx = phi.shape
     for k in range(first, last):
         for j in range(ny):
+            before = j - 1 if j > 0 else ny - 1
             for i in range(nx):
-                here = phi[k, j, i]
-                if i > 0 or not wall_x:
-                    u[k + 2, j + 2, i + 2] -= (here - phi[k, j, i - 1]) * rdx  # index −1 wraps
-                if j > 0 or not wall_y:
-                    v[k + 2, j + 2, i + 2] -= (here - phi[k, j - 1, i]) * rdy
-                if k > 0:
-                    w[k + 2, j + 2, i + 2] -= (here - phi[k - 1, j, i]) * rdzf[k + 2]
+                v[k + 2, j + 2, i + 2] -= (phi[k, j, i] - phi[k, before, i]) * rdy
+            u[k + 2, j + 2, 2] -= (phi[k, j, 0] - phi[k, j, nx - 1]) * rdx
+            for i in range(1, nx):
+                u[k + 2, j + 2, i + 2] -= (phi[k, j, i] - phi[k, j, i - 1]) * rdx
+            if k > 0:
+                rise = rdzf[k + 2]
+                for i in range(nx):
+                    w[k + 2, j + 2, i + 2] -= (phi[k, j, i] - phi[k - 1, j, i]) * rise
 
 
 @compiled(fastmath={"contract"})

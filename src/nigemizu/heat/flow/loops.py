@@ -42,6 +42,7 @@ class Loops(Cells):
         grid = frame.grid
         self.u, self.v, self.w, self.warmth = (padded(grid.shape) for _ in range(4))
         self._increments = [np.zeros(grid.shape) for _ in range(4)]
+        self._room = np.empty(grid.shape)
         self._nu = np.full(self.u.shape, frame.flow.viscosity)
         self._poisson = Poisson(grid, frame.walls, self._share, self.workers)
 
@@ -72,7 +73,9 @@ class Loops(Cells):
         return self.u[k], self.v[k], self.warmth[k]
 
     def divergence(self) -> np.ndarray:
-        result = np.empty(self.frame.grid.shape)
+        return self._outflow(np.empty(self.frame.grid.shape))
+
+    def _outflow(self, result: np.ndarray) -> np.ndarray:
         metric = self.metric
         self._levels(kernels.divergence, self.u, self.v, self.w, result, metric.rdx, metric.rdy, metric.rdz)
         return result
@@ -81,11 +84,13 @@ class Loops(Cells):
     def rates(self, lift: float, largest: float, upwards: bool) -> tuple[float, float, float]:
         metric, flow = self.metric, self.frame.flow
         if flow.closure != "none":
-            args = (self.u, self.v, self.w, self._nu, flow.viscosity, flow.closure_constant)
-            self._levels(kernels.eddy_viscosity, *args, metric.rdx, metric.rdy, metric.dz, metric.rdz)
+            law = (flow.viscosity, flow.closure_constant)
+            args = (self.u, self.v, self.w, self._nu)
+            self._levels(kernels.eddy_viscosity, *args, *law, metric.rdx, metric.rdy, metric.dz, metric.rdz)
             self.frame.padding.fill_viscosity(self._nu)
-        args = (self.u, self.v, self.w, self._nu, self.warmth, lift, largest, upwards)
-        found = self._levels(kernels.fastest, *args, metric.rdx, metric.rdy, metric.rdz, metric.rdzf)
+        args = (self.u, self.v, self.w, self._nu)
+        limits = (self.warmth, lift, largest, upwards)
+        found = self._levels(kernels.fastest, *args, *limits, metric.rdx, metric.rdy, metric.rdz, metric.rdzf)
         crossing, spreading, lifting = np.max(np.array(found), axis=0)
         return float(crossing), float(spreading), float(lifting)
 
@@ -97,7 +102,7 @@ class Loops(Cells):
         self._levels(momentum.push_u, u, v, w, nu, low.u, high.u, gu, a, dt, *metric)
         if frame.grid.shape[1] > 1 or frame.walls[1] or np.any(v):
             self._levels(momentum.push_v, u, v, w, nu, low.v, high.v, gv, a, dt, *metric)
-        vertical = (of.rdx, of.rdy, of.dz, of.rdzf)
+        vertical = (of.rdx, of.rdy, of.rdz, of.dz, of.rdzf)
         self._levels(momentum.push_w, u, v, w, nu, s, lift, zero, gw, a, dt, *vertical)
         eddies = 1 / flow.turbulent_prandtl if flow.closure == "vreman" else 0.0
         limited = flow.advection == "limited"
@@ -110,33 +115,31 @@ class Loops(Cells):
 
     def add(self, b: float, time: float) -> None:
         if self.frame.flow.closure == "none":
-            skip_x, skip_y = (int(wall) for wall in self.frame.walls)
-            skips = ((skip_x, 0, 0), (0, skip_y, 0), (0, 0, 1), (0, 0, 0))
-            for field, increment, skip in zip(self.fields, self._increments, skips, strict=True):
-                self._levels(kernels.add, field, increment, b, *skip)
+            for field, increment in zip(self.fields, self._increments, strict=True):
+                self._levels(kernels.add, field, increment, b)
         else:
             self._add_softly(b, time)
-        self._fill()
+        self.frame.padding.close(self.u, self.v, self.w)
 
     def _add_softly(self, b: float, time: float) -> None:
         """Increments that vertical diffusion has softened."""
         gu, gv, gw, gs = self._increments
         frame, flow, nu = self.frame, self.frame.flow, self._nu
         metric = (self.metric.rdz, self.metric.rdzf)
-        skip_x, skip_y = (int(wall) for wall in frame.walls)
         drag = 0.0 if flow.ground == "rough" else 2 * flow.viscosity * self.metric.rdz[PAD]
         held = 2 * frame.diffusivity * self.metric.rdz[PAD] if frame.holds else 0.0
         momentum_ = (nu, flow.viscosity, 1.0, flow.viscosity, drag)
         heat = (nu, flow.viscosity, 1 / flow.turbulent_prandtl, frame.diffusivity, held)
-        self._rows(softening.add_softly, self.u, gu, b, time, *momentum_, skip_x, 0, *metric)
-        self._rows(softening.add_softly, self.v, gv, b, time, *momentum_, 0, skip_y, *metric)
+        self._rows(softening.add_softly, self.u, gu, b, time, *momentum_, *metric)
+        self._rows(softening.add_softly, self.v, gv, b, time, *momentum_, *metric)
         self._rows(softening.add_softly_on_faces, self.w, gw, b, time, nu, *metric)
-        self._rows(softening.add_softly, self.warmth, gs, b, time, *heat, 0, 0, *metric)
+        self._rows(softening.add_softly, self.warmth, gs, b, time, *heat, *metric)
 
     def project(self) -> None:
-        phi = self._poisson.solve(self.divergence())
+        # What the sums here put on walls, the padding takes away.
+        phi = self._poisson.solve(self._outflow(self._room))
         metric = (self.metric.rdx, self.metric.rdy, self.metric.rdzf)
-        self._levels(kernels.correct, self.u, self.v, self.w, phi, *self.frame.walls, *metric)
+        self._levels(kernels.correct, self.u, self.v, self.w, phi, *metric)
         self._fill()
 
     def keep_mean(self, axis: int, mean: float) -> None:

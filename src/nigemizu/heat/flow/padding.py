@@ -105,6 +105,15 @@ class Padding:
             w[PAD - ghost] = -w[min(PAD + ghost, top)]
         w[top + 1] = -w[top - 1]
 
+    def close(self, u: Any, v: Any, w: Any) -> None:
+        """No more of it than what the divergence of the cells needs: the last faces along each axis."""
+        for axis, wall, field in ((2, self._walls[0], u), (1, self._walls[1], v)):
+            moved = np.moveaxis(field, axis, 0)
+            if wall:
+                moved[PAD] = 0.0
+            moved[-PAD] = moved[PAD]
+        w[PAD] = w[-PAD] = 0.0
+
     def fill_viscosity(self, nu: Any) -> None:
         """That of the viscosity."""
         for axis, wall in ((2, self._walls[0]), (1, self._walls[1])):

@@ -10,7 +10,7 @@ import numpy as np
 
 from nigemizu.heat.flow.cells import INSIDE, Cells, Fluxes, Frame, Velocity
 from nigemizu.heat.flow.device.columns import Softness, soften, soften_faces
-from nigemizu.heat.flow.device.lattice import X, Y, Z, Lattice
+from nigemizu.heat.flow.device.lattice import Lattice, X, Y, Z
 from nigemizu.heat.flow.device.pressure import DevicePoisson
 from nigemizu.heat.flow.device.stencils import (
     Air,

@@ -101,7 +101,9 @@ def soften_faces(cells: Lattice, g: Any, b: Any, time: Any, nu: Any) -> Any:
 
 
 @dr.syntax
-def solve_columns(types: Any, modes: Any, levels: int, rows: int, inverse: Any, lower: Any, upper: Any) -> Any:
+def solve_columns(
+    types: Any, modes: Any, levels: int, rows: int, inverse: Any, lower: Any, upper: Any
+) -> Any:
     """φ (modes, rows) from the right-hand side `modes` (modes, rows), of whose rows the first `levels` count.
 
     `inverse` (modes, rows) holds the inverse pivots, `lower` and `upper` (levels,) the coefficients of the

@@ -11,7 +11,7 @@ import numpy as np
 from nigemizu.heat.flow.cells import Metric
 from nigemizu.heat.flow.padding import PAD
 
-__all__ = ["X", "Y", "Z", "Lattice", "ahead", "behind"]
+__all__ = ["Lattice", "X", "Y", "Z", "ahead", "behind"]
 
 X, Y, Z = 0, 1, 2
 Offset = tuple[int, int, int]

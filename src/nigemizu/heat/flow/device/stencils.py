@@ -2,8 +2,8 @@ r"""What changes velocity and temperature, for every cell at once.
 
 Momentum, heat and eddies as in `nigemizu.heat.flow.momentum` and `nigemizu.heat.flow.kernels`, which say
 where they come from. There the three components are written out for the processor's caches; here one formula
-serves them all. The momentum :math:`q` along the axis a is carried along the axis b by the velocity p, through
-a face (a = b: through the middle of a cell):
+serves them all. The momentum :math:`q` along the axis a is carried along the axis b by the velocity p,
+through a face (a = b: through the middle of a cell):
 
 .. math:: F_{ab} = \bar p^a\, \bar q^b - \bar\nu^{ab} (\delta_b q + \delta_a p)
 
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, final
 
 import drjit as dr
 
-from nigemizu.heat.flow.device.lattice import X, Y, Z, Lattice, Offset, ahead, behind
+from nigemizu.heat.flow.device.lattice import Lattice, Offset, X, Y, Z, ahead, behind
 
 __all__ = ["Air", "HeatLaw", "eddy_viscosity", "fastest", "heat_change", "momentum_change", "outflow"]
 
@@ -51,8 +51,9 @@ def momentum_change(
     total = cells.types.Float(0)
     for along in _AXES:
         if along == axis:
-            there, here = _through_middle(cells, air, axis, (0, 0, 0)), _through_middle(
-                cells, air, axis, behind(axis)
+            there, here = (
+                _through_middle(cells, air, axis, (0, 0, 0)),
+                _through_middle(cells, air, axis, behind(axis)),
             )
             width = cells.between(axis)
         else:
@@ -137,9 +138,7 @@ def outflow(cells: Lattice, velocity: tuple[Any, Any, Any]) -> Any:
     )
 
 
-def eddy_viscosity(
-    cells: Lattice, velocity: tuple[Any, Any, Any], molecular: float, constant: float
-) -> Any:
+def eddy_viscosity(cells: Lattice, velocity: tuple[Any, Any, Any], molecular: float, constant: float) -> Any:
     """Viscosity at the centres with the eddies of Vreman."""
     a = [[_gradient(cells, velocity[of], of, along) for of in _AXES] for along in _AXES]
     squares = (1 / cells.metric.rdx**2, 1 / cells.metric.rdy**2, dr.square(cells.of_level(cells.dz)))

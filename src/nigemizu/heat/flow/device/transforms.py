@@ -61,7 +61,9 @@ class Waves:
         assert after % 4 == 0
         self._types, self._before, self._quads = types, before, after // 4
         self._count = len(basis)
-        self._there, self._back = (types.Float(part.ravel()) for part in (basis, np.ascontiguousarray(basis.T)))
+        self._there, self._back = (
+            types.Float(part.ravel()) for part in (basis, np.ascontiguousarray(basis.T))
+        )
 
     def there(self, values: Any) -> Any:
         """To the coefficients of the waves."""
