@@ -161,9 +161,12 @@ def test_frames_of_a_film_join_their_reports():
     first = ErrorReport(worst=0.3, mean=0.01, strays=0.0, steps=10.0, queries=2.0, paths=100, shared=0.5)
     second = ErrorReport(worst=0.1, mean=0.03, strays=0.02, steps=20.0, queries=4.0, paths=301, shared=1.0)
     joined = ErrorReport.joined([first, second])
+    assert abs(joined.usual_worst - 0.2) < 1e-12
+    assert first.usual_worst == 0.3
     assert joined == ErrorReport(
-        worst=0.3, mean=0.02, strays=0.01, steps=15.0, queries=3.0, paths=200, shared=0.75
-    )
+        worst=0.3, mean=0.02, strays=0.01, steps=15.0, queries=3.0, paths=200, shared=0.75,
+        worst_of_each=(0.3, 0.1),
+    )  # fmt: skip
     assert ErrorReport.joined(iter([first])) == first
     with pytest.warns(NigemizuWarning, match=r"up to 0\.3 pixels \(mean 0\.02\)"):
         warn_of_errors(dataclasses.replace(joined, strays=0.0), small())

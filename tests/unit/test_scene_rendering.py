@@ -49,6 +49,16 @@ def test_errors_larger_than_what_was_asked_for(worst: float, overrides: dict[str
         assert f"up to {worst:.2g} pixels (mean {worst / 10:.2g})" in message
 
 
+def test_a_film_is_judged_by_what_is_usual_in_its_frames() -> None:
+    """The worst of 64 thousand rays lies farther out than that of a thousand, however they are followed."""
+    scene = Scene.load("pyramid")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_errors(ErrorReport.joined([report(0.2), *[report(0.1)] * 9]), scene)
+    with pytest.warns(NigemizuWarning, match=r"up to 0\.3 pixels"):
+        warn_of_errors(ErrorReport.joined([report(0.3), *[report(0.12)] * 9]), scene)
+
+
 def test_rays_that_meet_something_else() -> None:
     """One in a thousand is not worth a word: it may be an edge finer than what is looked at around it."""
     assert told(0.01, {}, strays=0.001) == []

@@ -44,6 +44,8 @@ class ErrorReport:
         Paths that were flown for all rays to share; 0 where nothing is shared.
     shared : float
         Fraction of the picture whose rays share paths.
+    worst_of_each : tuple of float, pixels
+        Of several pictures: the largest displacement in each.
     """
 
     worst: float
@@ -53,6 +55,15 @@ class ErrorReport:
     queries: float
     paths: int
     shared: float
+    worst_of_each: tuple[float, ...] = ()
+
+    @property
+    def usual_worst(self) -> float:
+        """Largest displacement in a picture, the mean of several, pixels.
+
+        Of many pictures together more rays have been compared, and the worst of all lies farther out.
+        """
+        return float(np.mean(self.worst_of_each)) if self.worst_of_each else self.worst
 
     @staticmethod
     def joined(reports: Iterable[ErrorReport]) -> ErrorReport:
@@ -64,9 +75,9 @@ class ErrorReport:
         def mean(name: str) -> float:
             return float(np.mean([getattr(entry, name) for entry in entries]))
 
-        worst = max(entry.worst for entry in entries)
+        each = tuple(entry.worst for entry in entries)
         means = {name: mean(name) for name in ("mean", "strays", "steps", "queries", "shared")}
-        return ErrorReport(worst=worst, paths=round(mean("paths")), **means)
+        return ErrorReport(worst=max(each), paths=round(mean("paths")), worst_of_each=each, **means)
 
     def __str__(self) -> str:
         return (

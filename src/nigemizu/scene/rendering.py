@@ -295,7 +295,7 @@ def warn_of_errors(report: ErrorReport, scene: Scene) -> None:
     else:
         asked, remedy = _FIXED_STEP_ERROR, "shorten tracer.step, or leave it out for steps that adapt"
     faults = []
-    if report.worst > (asked if tracer.step is not None else _WORSE * asked):
+    if report.usual_worst > (asked if tracer.step is not None else _WORSE * asked):
         wanted = "" if tracer.step is not None else f" where {asked:.2g} were asked for"
         faults.append(
             f"what is seen is displaced by up to {report.worst:.2g} pixels (mean {report.mean:.2g}){wanted}"

@@ -20,7 +20,7 @@ __all__ = ["lay_cellwise"]
 Array = NDArray[np.floating[Any]]
 
 _GRIDS: Final = ((16, 16), (8, 16), (8, 8))  # cells of a block, across and down: the first that is worth it
-_WORTH: Final = 0.3  # nodes per ray
+_WORTH: Final = 0.45  # nodes per ray; of blocks that are not laid well enough every ray is marched
 _MOST_TORN: Final = 0.75  # of a block's cells; with more of them torn all its rays are marched
 _TOGETHER: Final = 1024  # blocks that are worked on at a time
 

@@ -27,6 +27,7 @@ _FINEST: Final = (32, 128)  # the same of the table, which is linear in between
 _LOCAL: Final = 4  # degree of the polynomials that lead from one to the other
 _GAIN: Final = 0.25  # of what the coarser grid misses, that the finer one may miss
 _WORTH: Final = 0.3  # nodes per ray
+_CHANCE: Final = 0.3  # of the blocks; where more need the second grid, the rest pass the first by chance
 _POLYNOMIAL, _LINEAR = 0.35, 0.25  # of the accuracy, for each of the two and each direction
 
 
@@ -86,6 +87,8 @@ def refine(
                 _GAIN * _displacement(*_against_coarser(states, axis), segments, blocks) for axis in (0, 1)
             ]
             coarse = [(w > _POLYNOMIAL * accuracy) & ~lost for w in wrong]
+            if part.states is None:
+                coarse = [~lost if np.mean(c) > _CHANCE else c for c in coarse]
             good = np.flatnonzero(~coarse[0] & ~coarse[1] & ~lost)
             rest = coarse[0] | coarse[1]
             worth = _nodes(part.grid, wrong, _POLYNOMIAL * accuracy) <= _WORTH * rays

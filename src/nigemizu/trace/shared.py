@@ -180,17 +180,6 @@ class SharedPaths:
             error=end.error + before.error,
         )
 
-    def withdraw(self, blocks: NDArray[np.intp]) -> None:
-        """Have the rays of these blocks marched one by one."""
-        if not len(blocks):
-            return
-        for number, cells in enumerate(self._cells):
-            counts = np.array(cells)
-            counts[blocks] = 0
-            self._cells[number] = self.types.UInt32(counts)
-        self.everywhere = False
-        self.report = replace(self.report, shared=self.report.shared - len(blocks) / self._blocks)
-
     def last_states(self, direction: Any) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Offset [m] and deflection where the last straight pieces begin, in the view's frame, (6, N); and
         which rays share their paths, (N,)."""

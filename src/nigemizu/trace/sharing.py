@@ -24,7 +24,7 @@ _FAR: Final = 0.5  # of the median exit: blocks that are left sooner are not tes
 _QUIET: Final = 0.02  # of the accuracy: blocks whose error is estimated smaller are not tested
 _PASSED: Final = 0.5  # of the accuracy, that the rays tested may be wrong by: others in the block are more so
 _PASSED_CELLWISE: Final = 1.0  # the same where what is not smooth has been marked
-_TESTS: Final = (4, 512, 8192)  # rays in each of the others: at least, at most, and in all of them together
+_TESTS: Final = (12, 512, 24576)  # rays in each of the others: at least, at most, and in all of them together
 _END_OF_GROUND: Final = 1e5  # m
 
 
@@ -76,7 +76,7 @@ def share_paths(
     }
     table, rough = refine(field, view, segments, **options)
     test = partial(
-        _wrong_blocks,
+        _wrong_places,
         field,
         view,
         segments,
@@ -86,15 +86,16 @@ def share_paths(
     )
     types = types or field.types
     paths = SharedPaths(types, view, segments, table)
-    wrong = test(paths, _doubtful(table, segments, accuracy), passed=_PASSED * accuracy)
+    wrong, _ = test(paths, _doubtful(table, segments, accuracy), passed=_PASSED * accuracy)
+    wrong = np.unique(wrong)
     if len(wrong):
         rough.append(OpenGrid(BLOCK, wrong, None, (1, 1)))
     if not rough:
         return paths
     table, laid = lay_cellwise(field, view, segments, table, rough, **options)
     paths = SharedPaths(types, view, segments, table)
-    paths.withdraw(test(paths, laid, passed=_PASSED_CELLWISE * accuracy))
-    return paths
+    wrong, across = test(paths, laid, passed=_PASSED_CELLWISE * accuracy)
+    return SharedPaths(types, view, segments, table.torn_at(wrong, across)) if len(wrong) else paths
 
 
 def _doubtful(table: PathTable, segments: Segments, accuracy: float) -> NDArray[np.intp]:
@@ -103,7 +104,7 @@ def _doubtful(table: PathTable, segments: Segments, accuracy: float) -> NDArray[
     return np.flatnonzero((table.cells[:, 0] > 0) & ((table.error > _QUIET * accuracy) | far))
 
 
-def _wrong_blocks(
+def _wrong_places(
     field: Field,
     view: View,
     segments: Segments,
@@ -114,20 +115,20 @@ def _wrong_blocks(
     integration: float,
     max_steps: int,
     floor: float,
-) -> NDArray[np.intp]:
-    """Those of the blocks in which a few rays between the nodes, flown for the purpose, differ from the
-    table by more than `passed` [rad].
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Where a few rays between the nodes, flown for the purpose, differ from the table by more than `passed`
+    [rad]: in which of the blocks, and how far across it (0 to 1).
 
     What the grids' own comparison cannot see: a kink between two nodes.
     """
     if not len(blocks):
-        return blocks
+        return blocks, np.zeros(0)
     row, column = np.divmod(blocks, segments.columns)
     fewest, most, together = _TESTS
-    tests = max(fewest, min(most, together // len(blocks)))
-    u, v = spread(tests)
+    count = max(fewest, min(most, together // len(blocks)))
+    u, v = spread(count)
     x, y = ((column + u[:, None]) * BLOCK[0]).ravel(), ((row + v[:, None]) * BLOCK[1]).ravel()
-    lengths = np.tile(segments.last[blocks], tests)[None]
+    lengths = np.tile(segments.last[blocks], count)[None]
     flown = fly_places(field, view, x, y, lengths, integration, max_steps)
     states = flown.states[:, 0].astype(np.float64)
     interpolated, shared = paths.last_states(view.rays(paths.types, x, y)[1])
@@ -139,8 +140,8 @@ def _wrong_blocks(
     ends = flown.lowest < floor
     displaced[~flown.outside & ~ends] = np.inf
     displaced[ends | ~shared] = 0
-    displaced = displaced.reshape(tests, -1).max(axis=0)
-    return np.asarray(blocks[displaced > passed])
+    test, number = np.nonzero(displaced.reshape(count, -1) > passed)
+    return blocks[number], u[test]
 
 
 def _farthest(field: Field, view: View, boxes: NDArray[np.float64]) -> float:

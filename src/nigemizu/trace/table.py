@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, final
 
 import numpy as np
@@ -55,6 +55,21 @@ class PathTable:
         order = laid[np.argsort(self.base[laid], kind="stable")]
         block = order[np.searchsorted(self.base[order], marks, side="right") - 1]
         return float(np.sum(1.0 / self.cells[block].prod(axis=1))) / max(len(self.cells), 1)
+
+    def torn_at(self, blocks: NDArray[np.intp], across: FloatArray) -> PathTable:
+        """The table with torn cells at places across blocks (0 to 1), from top to bottom.
+
+        The pictures of fluctuating air are torn from top to bottom more than from side to side: light that
+        runs along a face between two cells is bent by the one or by the other.
+        """
+        columns, rows = self.cells[blocks].astype(np.int64).T
+        column = np.minimum((across * columns).astype(np.int64), columns - 1)
+        records = self.records.copy()
+        marks = records.reshape(-1, RECORD)[:, 3]
+        for row in range(int(rows.max(initial=0))):
+            inside = row < rows
+            marks[(self.base[blocks] + row * (columns + 1) + column)[inside]] = 1
+        return replace(self, records=records)
 
 
 def records_of(states: Array) -> Array:
