@@ -15,7 +15,7 @@ test:  ## set up, then check format, lint, types and run the tests
 	@$(BIN)/python -m ruff format --check --quiet .
 	@$(BIN)/python -m ruff check --quiet .
 	@$(BIN)/python -m mypy
-	@$(BIN)/python -m pytest $(PYTEST)
+	@$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(PYTEST)
 
 film:  ## set up, then render the film of the hot road to out/road.mp4
 	@tools/setup

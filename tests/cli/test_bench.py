@@ -12,11 +12,14 @@ import pytest
 
 from nigemizu.cli.bench import BENCHMARKS, Sizes, rows, run_all, table
 from nigemizu.cli.bench.fan import power_law
+from nigemizu.cli.bench.heat import measure_convection
 from nigemizu.cli.bench.memory import synthetic_air
 from nigemizu.cli.bench.pictures import fluctuating_road
 from nigemizu.cli.bench.rays import Voxels, by_hand, flat_rays
 from nigemizu.cli.bench.superior import EARTH_RADIUS, inversion
+from nigemizu.cli.bench.table import _convection
 from nigemizu.cli.bench.timing import alternate, exponent
+from nigemizu.field import types
 
 Results = dict[str, Any]
 
@@ -278,3 +281,11 @@ def test_air_whose_memory_is_measured_is_no_larger_than_it_must_be() -> None:
     assert air.refractivity.flags.owndata
     assert air.refractivity.std(axis=(1, 2)) == pytest.approx(1e-8, rel=0.3)
     assert np.all(np.diff(air.refractivity.mean(axis=(1, 2)))[:4] > 0)
+
+
+def test_a_card_is_measured_beside_the_processor() -> None:
+    found = measure_convection((8, 8, 16), steps=1, card=types("llvm", "double"))
+    assert found["card_updates_per_second"] > 0
+    said = _convection(found).ratio
+    assert f"{found['card_updates_per_second'] / found['cell_updates_per_second']:.1f} × on the card" in said
+    assert "card" not in _convection(measure_convection((8, 8, 16), steps=1)).ratio

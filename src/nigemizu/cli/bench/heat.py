@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -79,7 +81,11 @@ def measure_heat(
 
 
 def measure_convection(
-    cells: tuple[int, int, int] = (128, 128, 64), steps: int = 3, *, progress: ProgressMeter = SILENT
+    cells: tuple[int, int, int] = (128, 128, 64),
+    steps: int = 3,
+    *,
+    card: Any = None,
+    progress: ProgressMeter = SILENT,
 ) -> dict[str, Any]:
     """Cell-updates per second of air that moves by itself: eddies, rough ground, wind, stretched cells.
 
@@ -89,13 +95,15 @@ def measure_convection(
         Number of cells along x, y and z.
     steps : int
         Steps that are timed at once, of three stages each.
+    card : nigemizu.field.Types, optional
+        Array types of a device that is measured in turns with the processor.
     progress : ProgressMeter
 
     Returns
     -------
     dict
         ``cell_updates_per_second`` [1/s], and ``volumes`` [1]: the most memory that was held by arrays, in
-        volumes of float64.
+        volumes of float64; with a card ``card_updates_per_second`` too.
     """
     from nigemizu.heat import Convection, GridSpec, HeldGround, Quantity, Sides, Top
     from nigemizu.heat.flow.moving import MovingAir
@@ -107,25 +115,27 @@ def measure_convection(
     velocity = 0.2 * random.standard_normal((3, *grid.shape))
     ground = HeldGround(temperature=Quantity(value=330.0))
 
-    def begin() -> MovingAir:
-        return MovingAir(grid, Convection(ground="rough"), ground, Sides(), Top(), 2.2e-5)
+    def begin(arrays: Any = None) -> MovingAir:
+        return MovingAir(grid, Convection(ground="rough"), ground, Sides(), Top(), 2.2e-5, arrays=arrays)
 
-    def advance(count: int) -> None:
+    def advance(air: MovingAir, count: int) -> None:
         for _ in range(count):
             air.advance(air.longest_step(), (1.0, None))
 
-    with begin() as air:
-        air.set(temperature, (velocity[0], velocity[1], velocity[2]))
-        seconds = alternate({"steps": lambda: advance(steps)}, SELDOM, label="convection", progress=progress)
-    del air
+    devices = {"cell_updates_per_second": None} | ({} if card is None else {"card_updates_per_second": card})
+    with ExitStack() as stack:
+        works = {}
+        for name, arrays in devices.items():
+            air = stack.enter_context(begin(arrays))
+            air.set(temperature, (velocity[0], velocity[1], velocity[2]))
+            works[name] = partial(advance, air, steps)
+        seconds = alternate(works, SELDOM, label="convection", progress=progress)
+    del air, works
     tracemalloc.start()
     with begin() as air:
         air.set(temperature, (velocity[0], velocity[1], velocity[2]))
-        advance(1)
+        advance(air, 1)
         held = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    return {
-        "cells": list(cells),
-        "cell_updates_per_second": temperature.size * steps / seconds["steps"],
-        "volumes": held / temperature.nbytes,
-    }
+    speeds = {name: temperature.size * steps / taken for name, taken in seconds.items()}
+    return {"cells": list(cells), **speeds, "volumes": held / temperature.nbytes}

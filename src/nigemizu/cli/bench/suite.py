@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,6 +23,7 @@ from nigemizu.cli.bench.superior import measure_far_view
 from nigemizu.cli.bench.timing import OFTEN, SELDOM
 from nigemizu.cli.meter import meter
 from nigemizu.progress import ProgressMeter
+from nigemizu.scene.running import flow_arrays
 
 if TYPE_CHECKING:
     from nigemizu.scene import Scene
@@ -188,7 +190,8 @@ class _Suite:
         return measure_heat(self._sizes.heat, progress=progress)
 
     def convection(self, progress: ProgressMeter) -> dict[str, Any]:
-        return measure_convection(self._sizes.convection, progress=progress)
+        cells = self._sizes.convection
+        return measure_convection(cells, card=flow_arrays("auto", math.prod(cells)), progress=progress)
 
     def film(self, progress: ProgressMeter) -> dict[str, Any]:
         sizes = self._sizes

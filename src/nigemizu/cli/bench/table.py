@@ -144,10 +144,11 @@ def _heat(found: dict[str, Any]) -> list[Row]:
 
 def _convection(found: dict[str, Any]) -> Row:
     nx, ny, nz = found["cells"]
+    speed, card = found["cell_updates_per_second"], found.get("card_updates_per_second")
     return Row(
         f"convection, {nx}×{ny}×{nz} cells",
-        f"{found['cell_updates_per_second'] / 1e6:.1f} million cell-updates/s",
-        f"holds {found['volumes']:.1f} volumes",
+        f"{speed / 1e6:.1f} million cell-updates/s",
+        f"holds {found['volumes']:.1f} volumes" + (f", {card / speed:.1f} × on the card" if card else ""),
     )
 
 
