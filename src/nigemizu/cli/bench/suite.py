@@ -23,7 +23,6 @@ from nigemizu.cli.bench.superior import measure_far_view
 from nigemizu.cli.bench.timing import OFTEN, SELDOM
 from nigemizu.cli.meter import meter
 from nigemizu.progress import ProgressMeter
-from nigemizu.scene.running import flow_arrays
 
 if TYPE_CHECKING:
     from nigemizu.scene import Scene
@@ -190,6 +189,8 @@ class _Suite:
         return measure_heat(self._sizes.heat, progress=progress)
 
     def convection(self, progress: ProgressMeter) -> dict[str, Any]:
+        from nigemizu.scene.running import flow_arrays
+
         cells = self._sizes.convection
         return measure_convection(cells, card=flow_arrays("auto", math.prod(cells)), progress=progress)
 
