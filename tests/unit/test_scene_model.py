@@ -129,6 +129,22 @@ def test_schema_names_every_key_and_accepts_units() -> None:
     assert undocumented == []
 
 
+def test_schema_knows_places_by_bearing_and_units_inside_arrays() -> None:
+    schema = Scene.json_schema()
+    position = schema["$defs"]["Pole"]["properties"]["position"]
+    coordinates, place = position["anyOf"]
+    assert place == {"$ref": "#/$defs/Place"}
+    assert [{part["type"] for part in axis["anyOf"]} for axis in coordinates["prefixItems"]] == [
+        {"number", "string"}
+    ] * 3
+    assert set(schema["$defs"]["Place"]["properties"]) == {"distance", "bearing", "height"}
+    assert schema["$defs"]["Place"]["required"] == ["distance"]
+    # A point is no text, though each of its coordinates may be one.
+    target = schema["$defs"]["Camera"]["properties"]["target"]
+    assert [part["type"] for part in target["anyOf"]] == ["array", "null"]
+    assert target["anyOf"][0]["prefixItems"][0]["anyOf"][1]["type"] == "string"
+
+
 def test_lengths_and_temperatures_say_their_unit() -> None:
     for value, key, unit in (
         (TimeSpec, "picture", "s"),

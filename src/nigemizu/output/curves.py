@@ -272,7 +272,7 @@ def _draw_transfer(axes: Axes, shown: TransferFigure, window: tuple[float, float
     if foot > bottom:
         axes.axhspan(_MINUTES * bottom, _MINUTES * foot, color=_GROUND, lw=0, alpha=0.7, zorder=1)
         axes.annotate(
-            "the ground hides the object", (0.99, _MINUTES * foot), xycoords=("axes fraction", "data"),
+            "the surface hides the object", (0.99, _MINUTES * foot), xycoords=("axes fraction", "data"),
             xytext=(0, -3), textcoords="offset points", ha="right", va="top", fontsize=8.5, color="#4d3a1e",
         )  # fmt: skip
     axes.axhline(0.0, color=_FAINT, lw=0.8, ls=":", zorder=1.5)

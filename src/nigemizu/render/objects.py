@@ -46,14 +46,23 @@ def _read_place(given: Any) -> Any:
             )
     if "distance" not in given:
         raise PydanticCustomError("wrong_type", "is missing", {"key": "distance", "expected": "metres"})
-    place = _Place.model_validate(dict(given))
+    place = Place.model_validate(dict(given))
     turn = math.radians(place.bearing)
     return place.distance * math.sin(turn), place.distance * math.cos(turn), place.height
 
 
 @final
-class _Place(Value):
-    """Distance along the ground from x = y = 0, compass bearing (0 = +y, 90 = +x), height."""
+class Place(Value):
+    """Where something stands, as seen from x = y = 0.
+
+    Parameters
+    ----------
+    distance : float, m
+        Along the ground.
+    bearing : float, degrees
+        By compass: 0 = +y (north), 90 = +x (east).
+    height : float, m
+    """
 
     distance: Annotated[float, Field(ge=0, json_schema_extra={"unit": "m"})]
     bearing: Annotated[float, Field(ge=-360, le=360, json_schema_extra={"unit": "degree"})] = 90.0
@@ -61,7 +70,9 @@ class _Place(Value):
 
 
 Position = Annotated[
-    tuple[float, float, float], BeforeValidator(_read_place), Field(json_schema_extra={"unit": "m"})
+    tuple[float, float, float],
+    BeforeValidator(_read_place, json_schema_input_type=tuple[float, float, float] | Place),
+    Field(json_schema_extra={"unit": "m"}),
 ]
 """(x, y, z), or ``{ distance, bearing, height }``, the bearing by compass: 0 = +y (north), 90 = +x (east)."""
 

@@ -44,7 +44,11 @@ def _accept_units(entry: dict[str, Any], unit: str) -> None:
         del entry["type"]
         entry["anyOf"] = [{"type": "number", **limits}, text]
     elif "anyOf" in entry:
-        entry["anyOf"] = [*entry["anyOf"], text]
+        if any(other.get("type") == "number" for other in entry["anyOf"]):
+            entry["anyOf"] = [*entry["anyOf"], text]
+        for other in entry["anyOf"]:
+            if other.get("type") == "array":
+                _accept_units(other, unit)
     for name in ("items", "additionalItems"):
         if isinstance(entry.get(name), dict):
             _accept_units(entry[name], unit)

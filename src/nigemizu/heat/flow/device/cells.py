@@ -122,7 +122,9 @@ class DeviceCells(Cells):
 
     def release(self, parts: Sequence[tuple[Part, float]]) -> None:
         for part, time in parts:
-            _, places, rate = self._parts.setdefault(id(part), self._sent(part))
+            if id(part) not in self._parts:
+                self._parts[id(part)] = self._sent(part)
+            _, places, rate = self._parts[id(part)]
             step = dr.opaque(self._types.Float, time)
             dr.scatter_add(self._increments[part.field], step * rate, places)
 
