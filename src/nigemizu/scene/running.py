@@ -48,9 +48,8 @@ _PHYSICS: Final = {
     "grid", "initial", "ground", "sides", "top", "diffusivity", "wind", "convection", "sources",
 }  # fmt: skip
 
-_WORTH_A_CARD: Final = (
-    100_000  # cells; a step of fewer is made of kernels that take longer to start than to run
-)
+# Cells; a step of fewer is made of kernels that take longer to start than to run.
+_WORTH_A_CARD: Final = 100_000
 
 
 class AirVolume(NamedTuple):

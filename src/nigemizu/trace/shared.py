@@ -77,7 +77,6 @@ class SharedPaths:
         Float, UInt32 = types.Float, types.UInt32
         self.types = types
         self.view = view
-        self._blocks = len(segments.count)
         self._columns = dr.opaque(UInt32, segments.columns)
         self._rows = dr.opaque(UInt32, segments.rows)
         self._most = dr.opaque(UInt32, segments.start.shape[1])

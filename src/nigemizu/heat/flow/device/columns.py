@@ -6,6 +6,7 @@ Both are Thomas's elimination. What it leaves is kept in memory of the column's 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple, final
 
 import drjit as dr
@@ -27,73 +28,66 @@ class Softness(NamedTuple):
     wall: float
 
 
-@dr.syntax
 def soften(cells: Lattice, g: Any, b: Any, time: Any, nu: Any, softness: Softness) -> Any:
     """Increments b G of values at the height of the centres, softened; `time` is b Δt [s]."""
+    Float, top = cells.types.Float, cells.shape[0] - 1
+    molecular, over, least, wall = softness
+
+    def conductances(k: Any, place: Any) -> tuple[Any, Any, Any]:
+        below, here, above = (
+            dr.gather(Float, nu, at) for at in (place - cells.plane, place, place + cells.plane)
+        )
+        over_height = time * dr.gather(Float, cells.rdz, k + PAD)
+        down = dr.select(k == 0, 0, over_height * dr.gather(Float, cells.rdzf, k + PAD))
+        up = dr.select(k == top, 0, over_height * dr.gather(Float, cells.rdzf, k + PAD + 1))
+        lower = down * (least + (0.5 * (below + here) - molecular) * over)
+        upper = up * (least + (0.5 * (here + above) - molecular) * over)
+        return dr.select(k == 0, over_height * wall, 0), lower, upper
+
+    return _softened(cells, g, b, 0, conductances)
+
+
+def soften_faces(cells: Lattice, g: Any, b: Any, time: Any, nu: Any) -> Any:
+    """The same of w, on lower faces: 2ν ∂w/∂z; the faces of ground and top do not move."""
+    Float = cells.types.Float
+
+    def conductances(k: Any, place: Any) -> tuple[Any, Any, Any]:
+        between = 2 * time * dr.gather(Float, cells.rdzf, k + PAD)
+        lower = between * dr.gather(Float, cells.rdz, k + PAD - 1) * dr.gather(Float, nu, place - cells.plane)
+        upper = between * dr.gather(Float, cells.rdz, k + PAD) * dr.gather(Float, nu, place)
+        return Float(0), lower, upper
+
+    return _softened(cells, g, b, 1, conductances)
+
+
+@dr.syntax
+def _softened(
+    cells: Lattice,
+    g: Any,
+    b: Any,
+    lowest: int,
+    conductances: Callable[[Any, Any], tuple[Any, Any, Any]],
+) -> Any:
+    """Solve for b G from the level `lowest` on, with the conductances of the ground, down and up."""
     Float, UInt32 = cells.types.Float, cells.types.UInt32
     nz, ny, nx = cells.shape
-    molecular, over, least, wall = softness
     softened = dr.zeros(Float, cells.count)
     column = dr.arange(UInt32, ny * nx)
     place = cells.place_of(column)
     c, d = dr.alloc_local(Float, nz), dr.alloc_local(Float, nz)
     # ---- up: eliminate what lies below
-    k, last_c, last_d = UInt32(0), Float(0), Float(0)
-    below = dr.gather(Float, nu, place - cells.plane)
-    here = dr.gather(Float, nu, place)
+    k, last_c, last_d = UInt32(lowest), Float(0), Float(0)
     while dr.hint(k < nz, label="soften up", exclude=[softened]):
-        p, at = k + PAD, place + k * cells.plane
-        above = dr.gather(Float, nu, at + cells.plane)
-        over_height = time * dr.gather(Float, cells.rdz, p)
-        down = dr.select(k == 0, 0, over_height * dr.gather(Float, cells.rdzf, p))
-        up = dr.select(k == nz - 1, 0, over_height * dr.gather(Float, cells.rdzf, p + 1))
-        bottom = dr.select(k == 0, over_height * wall, 0)
-        lower = down * (least + (0.5 * (below + here) - molecular) * over)
-        upper = up * (least + (0.5 * (here + above) - molecular) * over)
+        bottom, lower, upper = conductances(k, place + k * cells.plane)
         pivot = dr.rcp(1 + bottom + lower + upper - lower * last_c)
         last_c = upper * pivot
         last_d = (b * dr.gather(Float, g, k * (ny * nx) + column) + lower * last_d) * pivot
         c[k] = last_c
         d[k] = last_d
-        below, here = here, above
         k += 1
     # ---- down: put in what is known above
     solved = Float(0)
-    while dr.hint(k > 0, label="soften down", exclude=[softened]):
-        k -= 1
-        solved = d[k] + c[k] * solved
-        dr.scatter(softened, solved, k * (ny * nx) + column)
-    return softened
-
-
-@dr.syntax
-def soften_faces(cells: Lattice, g: Any, b: Any, time: Any, nu: Any) -> Any:
-    """The same of w, on lower faces: 2ν ∂w/∂z; the faces of ground and top do not move."""
-    Float, UInt32 = cells.types.Float, cells.types.UInt32
-    nz, ny, nx = cells.shape
-    softened = dr.zeros(Float, cells.count)
-    column = dr.arange(UInt32, ny * nx)
-    place = cells.place_of(column)
-    c, d = dr.alloc_local(Float, nz), dr.alloc_local(Float, nz)
-    # ---- up: eliminate what lies below
-    k, last_c, last_d = UInt32(1), Float(0), Float(0)
-    below = dr.gather(Float, nu, place)
-    while dr.hint(k < nz, label="soften faces up", exclude=[softened]):
-        p = k + PAD
-        here = dr.gather(Float, nu, place + k * cells.plane)
-        between = 2 * time * dr.gather(Float, cells.rdzf, p)
-        lower = between * dr.gather(Float, cells.rdz, p - 1) * below
-        upper = between * dr.gather(Float, cells.rdz, p) * here
-        pivot = dr.rcp(1 + lower + upper - lower * last_c)
-        last_c = upper * pivot
-        last_d = (b * dr.gather(Float, g, k * (ny * nx) + column) + lower * last_d) * pivot
-        c[k] = last_c
-        d[k] = last_d
-        below = here
-        k += 1
-    # ---- down: put in what is known above
-    solved = Float(0)
-    while dr.hint(k > 1, label="soften faces down", exclude=[softened]):
+    while dr.hint(k > lowest, label="soften down", exclude=[softened]):
         k -= 1
         solved = d[k] + c[k] * solved
         dr.scatter(softened, solved, k * (ny * nx) + column)
